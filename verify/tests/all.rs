@@ -10,6 +10,7 @@ mod printed_mistakes;
 mod random_programs;
 mod sampling;
 mod singular_programs;
+mod spectral_accuracy;
 mod structure;
 mod uncompensated;
 mod user_formulas;

@@ -109,6 +109,8 @@ pub(crate) struct Code {
     pub(crate) groups: Vec<Vec<NodeId>>,
     /// Masks of the flags: degenerate, kink.
     pub(crate) flags: [Option<NodeId>; 2],
+    /// Masks of a general path: outside of the domain, conventions without a limit.
+    pub(crate) settled: [Option<NodeId>; 2],
     /// Mask where the ordinary path suffices.
     pub(crate) guard: Option<NodeId>,
 }
@@ -116,10 +118,20 @@ pub(crate) struct Code {
 impl Code {
     /// Puts the statements that compute groups of numbers and flags in order.
     pub(crate) fn new(graph: &Graph, groups: &[Vec<NodeId>], flags: [Option<NodeId>; 2]) -> Self {
+        Self::settling(graph, groups, flags, [None, None])
+    }
+
+    /// Puts the statements of a general path in order.
+    pub(crate) fn settling(
+        graph: &Graph,
+        groups: &[Vec<NodeId>],
+        flags: [Option<NodeId>; 2],
+        settled: [Option<NodeId>; 2],
+    ) -> Self {
         let mut sequence = Sequence::new(graph);
         let groups = groups.iter().map(|group| sequence.values(group)).collect();
-        let flags = flags.map(|flag| flag.map(|node| sequence.value(node)));
-        Self { statements: sequence.into_statements(), groups, flags, guard: None }
+        let [flags, settled] = [flags, settled].map(|masks| masks.map(|mask| mask.map(|node| sequence.value(node))));
+        Self { statements: sequence.into_statements(), groups, flags, settled, guard: None }
     }
 
     /// Puts the statements that compute a guard in order.
@@ -152,7 +164,7 @@ impl Code {
 
     /// Returns all results and masks.
     pub(crate) fn returned(&self) -> impl Iterator<Item = NodeId> {
-        let masks = self.flags.into_iter().chain([self.guard]).flatten();
+        let masks = self.flags.into_iter().chain(self.settled).chain([self.guard]).flatten();
         self.groups.iter().flatten().copied().chain(masks)
     }
 }

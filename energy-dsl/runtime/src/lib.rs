@@ -41,7 +41,7 @@ pub use numbers::{
     Unbounded, UnknownLevel, available, dispatch, dispatch_at, level,
 };
 #[doc(hidden)]
-pub use numbers::{Precautions, Ray, Roles, WithCare, settle, with_care};
+pub use numbers::{Care, Precautions, Ray, Roles, WithCare, settle, with_care};
 pub use results::{
     ConstraintHessian, ConstraintJacobian, ForceJacobians, ForceValue, Gradient, Hessian, HessianVector,
     ReducedHessian, ResidualJacobian, ResidualValue, Value,

@@ -237,15 +237,27 @@ fn with_care(
     let inputs = RefCell::new(Vec::new());
     let read = |input: Input| {
         let mut inputs = inputs.borrow_mut();
-        inputs.push(input);
-        let number = inputs.len() - 1;
+        let number = inputs.iter().position(|&other| other == input).unwrap_or_else(|| {
+            inputs.push(input);
+            inputs.len() - 1
+        });
         quote!(inputs[#number])
     };
     let mut schedule = Schedule::new(&routines.graph, &read);
     let all: Vec<NodeId> = general.groups.concat();
     let results = schedule.array(&all);
-    let (degenerate, kink) = (schedule.mask(general.flags[0]), schedule.mask(general.flags[1]));
+    let [degenerate, kink, outside, definite] =
+        [general.flags[0], general.flags[1], general.outside, general.definite].map(|mask| schedule.mask(mask));
     let statements = schedule.statements();
+    let is_outside = match general.outside {
+        None => quote!(::energy_dsl::Mask::none()),
+        Some(outside) => {
+            let mut schedule = Schedule::new(&routines.graph, &read);
+            let outside = schedule.value(outside);
+            let statements = schedule.statements();
+            quote!(#statements #outside)
+        }
+    };
     let mut first = 0;
     let outputs = method.fields.iter().zip(&general.groups).map(|((field, layout), nodes)| {
         let field = format_ident!("{field}");
@@ -267,7 +279,7 @@ fn with_care(
     let inputs = inputs.into_inner();
     let moves = inputs.iter().map(|input| matches!(input, Input::Position(_) | Input::Velocity(_)));
     let moves: Vec<bool> = moves.collect();
-    let (sizes, values_first) = (routine.sizes(), routine.has_values());
+    let (sizes, values_first, is_energy) = (routine.sizes(), routine.has_values(), routine.is_energy());
     let inputs: Vec<TokenStream> = inputs.into_iter().map(|input| read_input(program, input)).collect();
     let (reads, returns) = (inputs.len(), all.len());
     let what = format!("`{}` of [`{name}`].", method.routine);
@@ -277,7 +289,12 @@ fn with_care(
 
         impl ::energy_dsl::WithCare<#reads, #returns> for WithCare {
             const ROLES: ::energy_dsl::Roles<'static> =
-                ::energy_dsl::Roles { moves: &[#(#moves),*], groups: &[#(#sizes),*], values_first: #values_first };
+                ::energy_dsl::Roles {
+                    moves: &[#(#moves),*],
+                    groups: &[#(#sizes),*],
+                    values_first: #values_first,
+                    is_energy: #is_energy,
+                };
 
             fn compiled() -> &'static ::energy_dsl::Precautions<#reads, #returns> {
                 static COMPILED: ::energy_dsl::Precautions<#reads, #returns> =
@@ -287,9 +304,14 @@ fn with_care(
 
             fn run_at<T: ::energy_dsl::Real, L: ::energy_dsl::Level>(
                 inputs: &[T; #reads],
-            ) -> ([T; #returns], ::energy_dsl::Flags<T>) {
+            ) -> ([T; #returns], ::energy_dsl::Care<T>) {
                 #statements
-                (#results, ::energy_dsl::Flags { degenerate: #degenerate, kink: #kink })
+                let flags = ::energy_dsl::Flags { degenerate: #degenerate, kink: #kink };
+                (#results, ::energy_dsl::Care { flags, outside: #outside, definite: #definite })
+            }
+
+            fn is_outside_at<T: ::energy_dsl::Real, L: ::energy_dsl::Level>(inputs: &[T; #reads]) -> T::Mask {
+                #is_outside
             }
         }
     };

@@ -81,16 +81,18 @@ fn columns(f: &Lowered) -> Vec<Vec<NodeId>> {
 }
 
 /// σᵢ, uᵢ and vᵢ.
-struct Decomposition {
+pub(super) struct Decomposition {
     values: Vec<NodeId>,
-    left: Vec<Vec<NodeId>>,
-    right: Vec<Vec<NodeId>>,
+    /// The singular values of the matrix times the power of two that scales it.
+    pub(super) lengths: Vec<NodeId>,
+    pub(super) left: Vec<Vec<NodeId>>,
+    pub(super) right: Vec<Vec<NodeId>>,
     /// u₁ × u₂ of a 3×2 matrix.
     normal: Option<Vec<NodeId>>,
 }
 
 impl Decomposition {
-    fn new(g: &mut Graph, f: &Lowered) -> Self {
+    pub(super) fn new(g: &mut Graph, f: &Lowered) -> Self {
         let (rows, count) = f.dimensions();
         let scale = common_scale(g, &f.parts);
         let (square, one) = (g.dot(&f.parts, &f.parts), g.constant(1.0));
@@ -125,9 +127,9 @@ impl Decomposition {
                 normal = Some(third);
             }
         }
-        let values = lengths.into_iter().map(|length| g.div(length, scale)).collect();
+        let values = lengths.iter().map(|&length| g.div(length, scale)).collect();
         let right = columns.into_iter().map(|column| column.right).collect();
-        Self { values, left, right, normal }
+        Self { values, lengths, left, right, normal }
     }
 }
 
@@ -205,7 +207,7 @@ fn polished(g: &mut Graph, columns: Vec<Column>, f: &Lowered, scale: NodeId) -> 
 }
 
 /// Returns Σ aᵢ bᵢ with the rounding errors of products and sums added (Ogita, Rump and Oishi 2005).
-fn compensated_dot(g: &mut Graph, a: &[NodeId], b: &[NodeId]) -> NodeId {
+pub(super) fn compensated_dot(g: &mut Graph, a: &[NodeId], b: &[NodeId]) -> NodeId {
     let (mut sum, mut error) = (g.constant(0.0), g.constant(0.0));
     for (&a, &b) in a.iter().zip(b) {
         let (product, of_product) = (g.mul(a, b), g.product_error(a, b));

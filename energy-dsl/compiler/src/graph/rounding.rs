@@ -118,6 +118,15 @@ impl Graph {
         self.node(Op::IsModerate(a, degree))
     }
 
+    /// Creates a constant that depends on the precision of the number type.
+    pub fn by_precision(&mut self, double: f64, single: f64) -> NodeId {
+        // In single precision, the second number is 1.
+        let [one, more] = [1.0, 1.0 + 2.0_f64.powi(-30)].map(|x| self.constant(x));
+        let is_double = self.less(one, more);
+        let [double, single] = [double, single].map(|x| self.constant(x));
+        self.select(is_double, double, single)
+    }
+
     /// Creates a × b with fused products. It is more accurate, but not exactly 0 where the cross product vanishes.
     pub fn fused_cross(&mut self, a: &[NodeId], b: &[NodeId]) -> [NodeId; 3] {
         std::array::from_fn(|i| {

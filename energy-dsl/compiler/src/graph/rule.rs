@@ -165,6 +165,8 @@ pub struct RuleFlag {
     pub flag: Flag,
     /// Mask where it is raised.
     pub mask: NodeId,
+    /// Whether no limit exists where it is raised.
+    pub definite: bool,
 }
 
 /// The value and the derivatives of a primitive, as expressions of the same graph.
@@ -314,7 +316,14 @@ impl Rule {
     /// Adds a flag to the rule.
     #[must_use]
     pub fn flagged(mut self, order: u8, flag: Flag, mask: NodeId) -> Self {
-        self.flags.push(RuleFlag { order, flag, mask });
+        self.flags.push(RuleFlag { order, flag, mask, definite: false });
+        self
+    }
+
+    /// Adds a flag of conventions that have no limit.
+    #[must_use]
+    pub fn without_limit(mut self, order: u8, mask: NodeId) -> Self {
+        self.flags.push(RuleFlag { order, flag: Flag::Degenerate, mask, definite: true });
         self
     }
 }

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeSet;
 
+use super::domain::{outside, without_limit};
 use crate::graph::{Graph, NodeId, Op};
 use energy_runtime::Flag;
 
@@ -12,6 +13,10 @@ pub(super) struct Hazards {
     pub(super) flags: [Option<NodeId>; 2],
     /// Where all operands are of moderate size and away from singularities; `None` if they always are.
     pub(super) sound: Option<NodeId>,
+    /// Where the formula is not defined; `None` if it always is.
+    pub(super) outside: Option<NodeId>,
+    /// Where a result is a convention without a limit.
+    pub(super) definite: Option<NodeId>,
 }
 
 /// Operands up to 2²⁴⁰ (2³⁶ in single precision): their cubes, and those of their reciprocals, are numbers.
@@ -129,7 +134,7 @@ impl Hazards {
 
 /// Returns the hazards of derivatives of `roots` up to the given orders.
 pub(super) fn hazards(g: &mut Graph, roots: &[(NodeId, u8)]) -> Hazards {
-    let mut found = Hazards::default();
+    let mut found = Hazards { outside: outside(g, roots), definite: without_limit(g, roots), ..Hazards::default() };
     for &(root, order) in roots {
         for node in operations(g, &[root]) {
             match g.rule(node) {

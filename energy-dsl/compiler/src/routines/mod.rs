@@ -1,7 +1,9 @@
 //! The routines of each kind of declaration, as nodes of one graph.
 
 mod constraint;
+mod domain;
 mod hazards;
+mod magnitude;
 
 use crate::check::Program;
 use crate::diff::{Coordinates, Moving, Plan, SecondOrder, first_order, hessian_vector, only_dihedral, second_order};
@@ -36,6 +38,10 @@ pub struct General {
     pub groups: Vec<Vec<NodeId>>,
     /// Masks of inputs at which a result may be a convention: degenerate, kink. Rays through the input decide.
     pub flags: [Option<NodeId>; 2],
+    /// Mask of inputs outside of the formula's domain; `None` if there are none.
+    pub outside: Option<NodeId>,
+    /// Mask of inputs at which a result is a convention without a limit; `None` if there are none.
+    pub definite: Option<NodeId>,
 }
 
 impl Routine {
@@ -49,6 +55,12 @@ impl Routine {
     #[must_use]
     pub fn has_values(&self) -> bool {
         self.name != "hessian_vector"
+    }
+
+    /// Returns whether the first result is an energy, which is infinite outside of its domain.
+    #[must_use]
+    pub fn is_energy(&self) -> bool {
+        ["value", "gradient", "hessian", "reduced_hessian", "gauss_newton"].contains(&self.name)
     }
 
     /// Returns all outputs.
@@ -80,9 +92,17 @@ impl Whole {
     }
 
     fn nodes(&self) -> Vec<NodeId> {
-        let Hazards { flags, sound } = self.hazards;
+        let Hazards { flags, sound, .. } = self.hazards;
         let masks = flags.into_iter().flatten().chain(sound);
         self.reduced.iter().copied().chain(self.groups.iter().flatten().copied()).chain(masks).collect()
+    }
+
+    /// Returns the masks where the general path needs no rays: outside of the domain, and where no limit exists.
+    fn settled(&self, g: &mut Graph) -> [Option<NodeId>; 2] {
+        let masks = [self.hazards.outside, self.hazards.definite];
+        let known: Vec<NodeId> = masks.into_iter().flatten().collect();
+        let mut rebuilt = general(g, &known).into_iter();
+        masks.map(|mask| mask.and_then(|_| rebuilt.next()).filter(|&mask| g.op(mask) != Op::Truth(false)))
     }
 
     /// Replaces the nodes of the routine.
@@ -94,7 +114,7 @@ impl Whole {
         let mut mask = |mask: Option<NodeId>| mask.map(|_| take(1)[0]);
         let flags = self.hazards.flags.map(|flag| mask(flag).filter(|&flag| g.op(flag) != Op::Truth(false)));
         let sound = mask(self.hazards.sound).filter(|&sound| g.op(sound) != Op::Truth(true));
-        Self { name: self.name, reduced, groups, hazards: Hazards { flags, sound } }
+        Self { name: self.name, reduced, groups, hazards: Hazards { flags, sound, ..Hazards::default() } }
     }
 
     /// Returns the mask where the sum of the values is finite.
@@ -109,6 +129,7 @@ impl Whole {
     fn split(self, g: &mut Graph) -> Routine {
         let all = self.nodes();
         let cautious = general(g, &all);
+        let [outside, definite] = self.settled(g);
         let (nodes, moderate) = match ordinary(g, &all) {
             Some((nodes, moderate)) => (nodes, Some(moderate)),
             None => (cautious.clone(), None),
@@ -116,7 +137,7 @@ impl Whole {
         let nodes = with_signs_inside(g, &nodes);
         let ordinary = self.with(g, &nodes);
         let finite = ordinary.is_finite(g);
-        let Hazards { flags, sound } = ordinary.hazards;
+        let Hazards { flags, sound, .. } = ordinary.hazards;
         let unflagged = flags.into_iter().flatten().map(|flag| g.not(flag)).collect::<Vec<_>>();
         let guards: Vec<NodeId> = moderate.into_iter().chain(sound).chain(unflagged).collect();
         let Self { name, reduced, groups, .. } = ordinary;
@@ -127,7 +148,7 @@ impl Whole {
         };
         let ordinary = g.and(finite, guards);
         let Self { groups: with_care, hazards, .. } = self.with(g, &cautious);
-        let general = General { ordinary, guards, groups: with_care, flags: hazards.flags };
+        let general = General { ordinary, guards, groups: with_care, flags: hazards.flags, outside, definite };
         Routine { name, reduced, groups, flags: [None, None], general: Some(general) }
     }
 }

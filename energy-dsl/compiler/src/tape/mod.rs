@@ -23,8 +23,12 @@ pub(crate) struct RoutineCode {
     pub(crate) is_broken: bool,
     /// The mask where the ordinary path suffices, and the path for other inputs.
     general: Option<(Code, Code)>,
+    /// The mask of inputs outside of the domain; `None` if there are none.
+    outside: Option<Code>,
     /// Whether the first group is of values, not of derivatives.
     values_first: bool,
+    /// Whether the first group is an energy.
+    is_energy: bool,
     /// Whether derivatives are added to each other when they are expanded to points.
     is_summed: bool,
 }
@@ -37,9 +41,17 @@ impl RoutineCode {
             ordinary: Code::new(graph, &routine.groups, routine.flags),
             is_broken: false,
             general: routine.general.as_ref().map(|general| {
-                (Code::guard(graph, general.ordinary), Code::new(graph, &general.groups, general.flags))
+                let settled = [general.outside, general.definite];
+                let path = Code::settling(graph, &general.groups, general.flags, settled);
+                (Code::guard(graph, general.ordinary), path)
             }),
+            outside: routine
+                .general
+                .as_ref()
+                .and_then(|general| general.outside)
+                .map(|outside| Code::guard(graph, outside)),
             values_first: routine.has_values(),
+            is_energy: routine.is_energy(),
             is_summed: routine.name == "reduced_hessian" && routines.vectors.len() > 1,
         }
     }
@@ -53,7 +65,9 @@ impl RoutineCode {
             ordinary: Code::new(&rest.graph, outputs, [routines.refused, None]),
             is_broken: false,
             general: None,
+            outside: None,
             values_first: true,
+            is_energy: false,
             is_summed: false,
         }
     }
@@ -63,6 +77,7 @@ impl RoutineCode {
         let guarded = self.general.as_ref().map(|(guard, _)| self.ordinary.with_guard(guard, !self.is_broken));
         let code = guarded.as_ref().unwrap_or(&self.ordinary);
         let mut inputs = leading.to_vec();
+        // The mask of the domain is one of the path's results, so that it has no other inputs.
         let others = self.general.as_ref().map(|(_, general)| inputs_of(general)).unwrap_or_default();
         for input in inputs_of(code).into_iter().chain(others.iter().copied()) {
             if !inputs.contains(&input) {
@@ -74,8 +89,15 @@ impl RoutineCode {
         let general = match &self.general {
             None => None,
             Some((_, code)) => {
-                let Recorded { tape, groups, flags, .. } = record(code, &others)?;
+                let Recorded { tape, groups, flags, settled, .. } = record(code, &others)?;
                 let (values, results) = (groups[0].len(), groups.concat());
+                let outside = match &self.outside {
+                    None => None,
+                    Some(code) => {
+                        let Recorded { tape, guard, .. } = record(code, &others)?;
+                        guard.map(|guard| (tape, guard))
+                    }
+                };
                 Some(General {
                     ordinary: ordinary.guard.expect("compiler bug: a general path has a guard"),
                     inputs: others
@@ -89,7 +111,10 @@ impl RoutineCode {
                     summed: if self.is_summed { values } else { results.len() },
                     results,
                     flags,
+                    settled,
+                    outside,
                     values_first: self.values_first,
+                    is_energy: self.is_energy,
                 })
             }
         };

@@ -15,6 +15,7 @@ pub(super) struct Recorded {
     pub(super) tape: Tape,
     pub(super) groups: Vec<Vec<u16>>,
     pub(super) flags: [Option<u16>; 2],
+    pub(super) settled: [Option<u16>; 2],
     pub(super) guard: Option<u16>,
 }
 
@@ -43,6 +44,7 @@ pub(super) fn record(code: &Code, inputs: &[Input]) -> Result<Recorded, TooLarge
         tape,
         groups: code.groups.iter().map(|group| group.iter().map(|&at| place(at)).collect()).collect(),
         flags: code.flags.map(|flag| flag.map(place)),
+        settled: code.settled.map(|mask| mask.map(place)),
         guard: code.guard.map(place),
     })
 }

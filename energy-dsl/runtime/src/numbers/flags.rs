@@ -25,6 +25,12 @@ impl<T: Number> Flags<T> {
         Self { degenerate: T::Mask::none(), kink: T::Mask::none() }
     }
 
+    /// Returns flags of which [`Flag::Degenerate`] is set in all lanes.
+    #[must_use]
+    pub fn degenerate() -> Self {
+        Self { degenerate: !T::Mask::none(), kink: T::Mask::none() }
+    }
+
     /// Returns the union of two sets of flags.
     #[must_use]
     pub fn union(self, other: Self) -> Self {

@@ -1,7 +1,7 @@
 //! Results at singular inputs.
 //!
 //! A result that is not finite, or that a flag marks, is evaluated along rays through the input. If all rays agree, the
-//! result has that limit.
+//! result has that limit. Outside of the formula's domain, and where no limit can exist, rays are not needed.
 
 use std::ops::Range;
 
@@ -22,6 +22,20 @@ pub struct Roles<'a> {
     pub groups: &'a [usize],
     /// Whether the first group is of values, not of derivatives.
     pub values_first: bool,
+    /// Whether the first group is an energy. It is infinite outside of its domain.
+    pub is_energy: bool,
+}
+
+/// Masks of a general path.
+#[doc(hidden)]
+#[derive(Clone, Copy, Debug)]
+pub struct Care<T: Number> {
+    /// Where a result may be a convention.
+    pub flags: Flags<T>,
+    /// Where the formula is not defined: the logarithm of a negative number.
+    pub outside: T::Mask,
+    /// Where results are conventions without a limit.
+    pub definite: T::Mask,
 }
 
 /// Rays that are tried first: four opposite pairs.
@@ -36,7 +50,50 @@ const MANY: usize = 24;
 ///
 /// `along` evaluates the results along a ray.
 #[doc(hidden)]
-pub fn settle<T: Number>(inputs: &[T], roles: Roles<'_>, results: &mut [T], flags: &mut Flags<T>, along: Along<'_>) {
+pub fn settle<T: Number>(
+    inputs: &[T],
+    roles: Roles<'_>,
+    results: &mut [T],
+    care: Care<T>,
+    along: Along<'_>,
+) -> Flags<T> {
+    let mut flags = care.flags;
+    if care.outside.any() {
+        fill_outside(roles, results);
+        return Flags::degenerate();
+    }
+    if care.definite.any() {
+        keep_conventions(roles, results);
+        return Flags::degenerate();
+    }
+    look_around(inputs, roles, results, &mut flags, along);
+    flags
+}
+
+/// Writes the results outside of the domain: an infinite energy, and zeros.
+pub(crate) fn fill_outside<T: Number>(roles: Roles<'_>, results: &mut [T]) {
+    results.fill(T::from_f64(0.0));
+    if let (true, Some(value)) = (roles.is_energy, results.first_mut()) {
+        *value = T::from_f64(f64::INFINITY);
+    }
+}
+
+/// Keeps each group of results whose numbers are all finite, and infinite values; other groups become 0.
+fn keep_conventions<T: Number>(roles: Roles<'_>, results: &mut [T]) {
+    let is_finite = |x: &T| (x.clone() - x.clone()).equal(T::from_f64(0.0)).all();
+    let is_number = |x: &T| x.clone().equal(x.clone()).all();
+    let mut rest = results;
+    for (number, &size) in roles.groups.iter().enumerate() {
+        let (group, others) = rest.split_at_mut(size);
+        let is_value = number == 0 && roles.values_first && size == 1;
+        if !group.iter().all(|x| if is_value { is_number(x) } else { is_finite(x) }) {
+            group.fill(T::from_f64(0.0));
+        }
+        rest = others;
+    }
+}
+
+fn look_around<T: Number>(inputs: &[T], roles: Roles<'_>, results: &mut [T], flags: &mut Flags<T>, along: Along<'_>) {
     let is_finite = |x: &T| (x.clone() - x.clone()).equal(T::from_f64(0.0)).all();
     if (flags.degenerate | flags.kink).any() || !results.iter().all(is_finite) {
         *flags = Flags::clear();
@@ -102,7 +159,7 @@ struct Group<'a> {
     agreements: Vec<Agreement>,
     /// Results at the input itself.
     plain: &'a [Unbounded<f64>],
-    /// The largest limit of the routine.
+    /// Size that rounding errors of limits are relative to.
     scale: Unbounded<f64>,
 }
 
@@ -143,8 +200,10 @@ impl<'a> Rays<'a> {
     }
 
     fn agree(&self) -> bool {
-        let (scale, results) = (self.largest(), self.roles.groups.iter().sum());
-        (0..results).all(|i| matches!(self.agreement(i, scale), Agreement::Number(_)))
+        let mut groups = self.groups().into_iter().zip(self.scales());
+        groups.all(|(group, scale)| {
+            group.into_iter().all(|i| matches!(self.agreement(i, scale), Agreement::Number(_)))
+        })
     }
 
     /// Looks for rays into narrow regions where the formula takes another branch, with other results.
@@ -171,12 +230,15 @@ impl<'a> Rays<'a> {
 
     /// Returns whether limits are those of the first ray, or do not exist because the formula is degenerate.
     fn has_results(&self, limits: Option<Vec<Limit>>) -> bool {
-        let scale = self.largest();
-        let same = |(a, b): (&Limit, &Limit)| match (a, b) {
+        let first = &self.paths[0].limits;
+        let same = |a: &Limit, b: &Limit, scale| match (a, b) {
             (Limit::Finite(a), Limit::Finite(b)) => is_near(*a, *b, scale),
             _ => false,
         };
-        limits.is_none_or(|limits| limits.iter().zip(&self.paths[0].limits).all(same))
+        limits.is_none_or(|limits| {
+            let mut groups = self.groups().into_iter().zip(self.scales());
+            groups.all(|(group, scale)| group.into_iter().all(|i| same(&limits[i], &first[i], scale)))
+        })
     }
 
     fn settle<T: Number>(mut self, plain: &[Unbounded<f64>], flags: &mut Flags<T>) -> Vec<Unbounded<f64>> {
@@ -186,13 +248,12 @@ impl<'a> Rays<'a> {
         } else {
             self.cast(MANY);
         }
-        let scale = self.largest();
         let mut settled = Vec::with_capacity(plain.len());
-        for (number, &size) in self.roles.groups.iter().enumerate() {
+        for (number, (range, scale)) in self.groups().into_iter().zip(self.scales()).enumerate() {
             let group = Group {
-                range: settled.len()..settled.len() + size,
-                agreements: (settled.len()..settled.len() + size).map(|i| self.agreement(i, scale)).collect(),
-                plain: &plain[settled.len()..settled.len() + size],
+                agreements: range.clone().map(|i| self.agreement(i, scale)).collect(),
+                plain: &plain[range.clone()],
+                range,
                 scale,
             };
             let is_value = number == 0 && self.roles.values_first;
@@ -255,10 +316,28 @@ impl<'a> Rays<'a> {
         })
     }
 
-    /// Returns the largest finite limit.
-    fn largest(&self) -> Unbounded<f64> {
-        let results = self.roles.groups.iter().sum();
-        (0..results).flat_map(|i| self.numbers(i)).fold(zero(), |largest, x| largest.max(x.abs()))
+    /// Returns the indices of the results of each group.
+    fn groups(&self) -> Vec<Range<usize>> {
+        let mut end = 0;
+        let range = |&size: &usize| {
+            end += size;
+            end - size..end
+        };
+        self.roles.groups.iter().map(range).collect()
+    }
+
+    /// Returns the sizes that rounding errors of each group are relative to: its largest limit, or what its derivatives
+    /// contribute over the distance of the input from 0.
+    fn scales(&self) -> Vec<Unbounded<f64>> {
+        let largest = |numbers: &mut dyn Iterator<Item = Unbounded<f64>>| numbers.fold(zero(), |a, b| a.max(b.abs()));
+        let moving = self.inputs.iter().zip(self.roles.moves).filter(|(input, moves)| **moves && input.is_finite());
+        let distance = largest(&mut moving.map(|(&input, _)| input));
+        let mut scales: Vec<_> =
+            self.groups().into_iter().map(|group| largest(&mut group.flat_map(|i| self.numbers(i)))).collect();
+        for group in (1..scales.len()).rev() {
+            scales[group - 1] = scales[group - 1].max(scales[group] * distance);
+        }
+        scales
     }
 
     /// Rays on which a result is not defined do not count: they leave its domain.
@@ -346,10 +425,14 @@ mod tests {
         let inputs = [Unbounded::<f64>::of(0.0); 2];
         let results = formula(&[0, 1].map(|_| Ray::from_f64(0.0))).len();
         let mut results = vec![Unbounded::of(f64::NAN); results];
-        let mut flags = Flags::clear();
-        let roles = Roles { moves: &[true, true], groups: &[values, results.len() - values], values_first: true };
-        settle(&inputs, roles, &mut results, &mut flags, &|rays| Some(formula(rays)));
+        let groups = [values, results.len() - values];
+        let roles = Roles { moves: &[true, true], groups: &groups, values_first: true, is_energy: true };
+        let flags = settle(&inputs, roles, &mut results, suspected(Flags::clear()), &|rays| Some(formula(rays)));
         (results.into_iter().map(Unbounded::to_scalar).collect(), (flags.degenerate, flags.kink))
+    }
+
+    fn suspected(flags: Flags<Unbounded<f64>>) -> Care<Unbounded<f64>> {
+        Care { flags, outside: false, definite: false }
     }
 
     fn length(x: &[Ray]) -> Ray {
@@ -380,24 +463,40 @@ mod tests {
 
     #[test]
     fn unread_flags_of_untaken_branches_vanish() {
-        let mut flags = Flags::<Unbounded<f64>> { degenerate: true, kink: true };
+        let care = suspected(Flags { degenerate: true, kink: true });
         let mut results = [Unbounded::of(3.0), Unbounded::of(0.0)];
-        let roles = Roles { moves: &[true], groups: &[1, results.len() - 1], values_first: true };
+        let roles = Roles { moves: &[true], groups: &[1, 1], values_first: true, is_energy: true };
         let along = |x: &[Ray]| Some(vec![Ray::from_f64(3.0), x[0] * Ray::from_f64(2.0)]);
-        settle(&[Unbounded::of(0.0)], roles, &mut results, &mut flags, &along);
+        let flags = settle(&[Unbounded::of(0.0)], roles, &mut results, care, &along);
         assert!(!flags.any() && results.map(Unbounded::to_scalar) == [3.0, 0.0]);
     }
 
     #[test]
     fn numbers_that_were_read_as_nan_stay_and_are_flagged() {
-        let mut flags = Flags::<Unbounded<f64>>::clear();
+        let care = suspected(Flags::clear());
         let mut results = [Unbounded::of(f64::NAN)];
-        let roles = Roles { moves: &[true], groups: &[1, results.len() - 1], values_first: true };
-        settle(&[Unbounded::of(f64::NAN)], roles, &mut results, &mut flags, &|_| None);
+        let roles = Roles { moves: &[true], groups: &[1], values_first: true, is_energy: true };
+        let flags = settle(&[Unbounded::of(f64::NAN)], roles, &mut results, care, &|_| None);
         assert!(flags.degenerate && results[0].to_scalar().is_nan());
-        let roles = Roles { groups: &[1], ..roles };
-        let (mut large, mut flags) = ([Unbounded::of(1e200) * Unbounded::of(1e200)], Flags::clear());
-        settle(&[Unbounded::of(1e200)], roles, &mut large, &mut flags, &|_| None);
+        let mut large = [Unbounded::of(1e200) * Unbounded::of(1e200)];
+        let flags = settle(&[Unbounded::of(1e200)], roles, &mut large, care, &|_| None);
         assert!(flags.degenerate && large[0].to_scalar() == f64::INFINITY);
+    }
+
+    #[test]
+    fn without_a_domain_or_a_limit_no_ray_is_needed() {
+        let never = |_: &[Ray]| -> Option<Vec<Ray>> { unreachable!("no ray is needed") };
+        let roles = Roles { moves: &[true], groups: &[1, 2], values_first: true, is_energy: true };
+        let settled = |care, is_energy| {
+            let mut results = [f64::NAN, f64::NAN, 3.0].map(Unbounded::<f64>::of);
+            let roles = Roles { is_energy, ..roles };
+            let flags = settle(&[Unbounded::of(0.0)], roles, &mut results, care, &never);
+            assert!(flags.degenerate && !flags.kink);
+            results.map(Unbounded::to_scalar)
+        };
+        let care = suspected(Flags::clear());
+        assert_eq!(settled(Care { outside: true, ..care }, true), [f64::INFINITY, 0.0, 0.0]);
+        assert_eq!(settled(Care { outside: true, ..care }, false), [0.0; 3]);
+        assert_eq!(settled(Care { definite: true, ..care }, true), [0.0; 3]);
     }
 }

@@ -184,14 +184,15 @@ fn is_smaller(a: &Point, b: &Point) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::numbers::{Flags, Number, Roles, settle};
+    use crate::numbers::{Care, Flags, Number, Roles, settle};
 
     /// Returns whether a value with one derivative is marked as a kink at 0, where the derivative is 1.
     fn is_kink(inputs: usize, formula: impl Fn(&[Ray]) -> Vec<Ray>) -> bool {
         let mut results = [0.0, 1.0].map(Unbounded::<f64>::of);
-        let mut flags = Flags { degenerate: false, kink: true };
-        let roles = Roles { moves: &vec![true; inputs], groups: &[1, 1], values_first: true };
-        settle(&vec![Unbounded::of(0.0); inputs], roles, &mut results, &mut flags, &|x| Some(formula(x)));
+        let flags = Flags { degenerate: false, kink: true };
+        let care = Care { flags, outside: false, definite: false };
+        let roles = Roles { moves: &vec![true; inputs], groups: &[1, 1], values_first: true, is_energy: true };
+        let flags = settle(&vec![Unbounded::of(0.0); inputs], roles, &mut results, care, &|x| Some(formula(x)));
         assert!(!flags.degenerate && results[1].to_scalar() == 1.0);
         flags.kink
     }

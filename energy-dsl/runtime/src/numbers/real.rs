@@ -3,7 +3,7 @@ use std::ops::{Add, BitAnd, BitOr, Div, Mul, Neg, Not, Sub};
 
 use super::cpu::{Scalar, dispatch_scalar};
 use super::elementary::{Atan2, Binary, Cos, Exp, Ln, ModerateAtan2, Pow, Sin, Unary, sin_cos};
-use super::flags::Flags;
+use super::limits::Care;
 use super::level::{Baseline, Kernel, Level};
 use super::unbounded::{Unbounded, WithCare};
 
@@ -166,6 +166,11 @@ pub trait Number:
     fn extended(&self) -> Option<Unbounded<f64>> {
         None
     }
+    /// Returns the nearest double; `None` if the type has more digits than that or is not a plain number.
+    #[doc(hidden)]
+    fn double(&self) -> Option<f64> {
+        None
+    }
     /// Returns the number nearest to one with an extended exponent. Only types that are [`Number::extended`] need it.
     #[doc(hidden)]
     #[must_use]
@@ -181,7 +186,7 @@ pub trait Number:
     #[doc(hidden)]
     fn run_with_care<W: WithCare<INPUTS, OUTPUTS>, const INPUTS: usize, const OUTPUTS: usize>(
         inputs: &[Self; INPUTS],
-    ) -> ([Self; OUTPUTS], Flags<Self>)
+    ) -> ([Self; OUTPUTS], Care<Self>)
     where
         Self: Real,
     {

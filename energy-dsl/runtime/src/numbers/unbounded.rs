@@ -4,8 +4,8 @@ use std::ops::{Add, Div, Mul, Neg, Sub};
 
 use super::cpu::{Fused, Scalar};
 use super::flags::Flags;
-use super::level::Level;
-use super::limits::{Roles, settle};
+use super::level::{Baseline, Level};
+use super::limits::{Care, Roles, fill_outside, settle};
 use super::ray::Ray;
 use super::real::{Mask, Number, Real};
 
@@ -317,6 +317,9 @@ impl<S: Scalar> Number for Unbounded<S> {
         let (significand, exponent) = self.to_double();
         Some(Unbounded::new(significand, exponent))
     }
+    fn double(&self) -> Option<f64> {
+        Some(if self.exponent == 0 { self.significand.to_f64() } else { self.to_scalar().to_f64() })
+    }
     fn of_extended(value: Unbounded<f64>) -> Self {
         let (significand, exponent) = value.split();
         Self::by_double(significand, exponent)
@@ -333,7 +336,7 @@ impl<S: Scalar> Number for Unbounded<S> {
     }
     fn run_with_care<W: WithCare<INPUTS, OUTPUTS>, const INPUTS: usize, const OUTPUTS: usize>(
         inputs: &[Self; INPUTS],
-    ) -> ([Self; OUTPUTS], Flags<Self>) {
+    ) -> ([Self; OUTPUTS], Care<Self>) {
         S::run_unbounded::<W, INPUTS, OUTPUTS>(inputs)
     }
 }
@@ -347,13 +350,16 @@ pub trait WithCare<const INPUTS: usize, const OUTPUTS: usize> {
     const ROLES: Roles<'static>;
 
     /// Runs the path at a SIMD level.
-    fn run_at<T: Real, L: Level>(inputs: &[T; INPUTS]) -> ([T; OUTPUTS], Flags<T>);
+    fn run_at<T: Real, L: Level>(inputs: &[T; INPUTS]) -> ([T; OUTPUTS], Care<T>);
+
+    /// Returns whether the input is outside of the formula's domain, by more than rounding errors.
+    fn is_outside_at<T: Real, L: Level>(inputs: &[T; INPUTS]) -> T::Mask;
 
     /// Returns the path in double precision, as compiled by the declaring crate.
     fn compiled() -> &'static Precautions<INPUTS, OUTPUTS>;
 
     /// Runs the path with fused operations.
-    fn run<T: Real>(inputs: &[T; INPUTS]) -> ([T; OUTPUTS], Flags<T>) {
+    fn run<T: Real>(inputs: &[T; INPUTS]) -> ([T; OUTPUTS], Care<T>) {
         Self::run_at::<T, Fused>(inputs)
     }
 }
@@ -365,15 +371,16 @@ pub trait WithCare<const INPUTS: usize, const OUTPUTS: usize> {
 pub struct Precautions<const INPUTS: usize, const OUTPUTS: usize> {
     pub(crate) double: Routine<Unbounded<f64>, INPUTS, OUTPUTS>,
     ray: Routine<Ray, INPUTS, OUTPUTS>,
+    is_outside: fn(&[f64; INPUTS]) -> bool,
 }
 
-type Routine<T, const INPUTS: usize, const OUTPUTS: usize> = fn(&[T; INPUTS]) -> ([T; OUTPUTS], Flags<T>);
+type Routine<T, const INPUTS: usize, const OUTPUTS: usize> = fn(&[T; INPUTS]) -> ([T; OUTPUTS], Care<T>);
 
 impl<const INPUTS: usize, const OUTPUTS: usize> Precautions<INPUTS, OUTPUTS> {
     /// Creates the table of a routine.
     #[must_use]
     pub const fn of<W: WithCare<INPUTS, OUTPUTS>>() -> Self {
-        Self { double: W::run::<Unbounded<f64>>, ray: W::run::<Ray> }
+        Self { double: W::run::<Unbounded<f64>>, ray: W::run::<Ray>, is_outside: W::is_outside_at::<f64, Baseline> }
     }
 }
 
@@ -396,12 +403,7 @@ pub fn with_care<W: WithCare<INPUTS, OUTPUTS>, T: Real, const INPUTS: usize, con
             continue;
         }
         let own = std::array::from_fn(|i| inputs[i].unbounded(lane));
-        let (mut results, mut flags) = T::Unbounded::run_with_care::<W, INPUTS, OUTPUTS>(&own);
-        let along = |rays: &[Ray]| {
-            let (results, flags) = (W::compiled().ray)(rays.try_into().expect("as many rays as inputs"));
-            (!flags.degenerate).then(|| results.to_vec())
-        };
-        settle(&own, W::ROLES, &mut results, &mut flags, &along);
+        let (results, flags) = of_one::<W, T, INPUTS, OUTPUTS>(&own);
         for (number, (output, result)) in outputs.iter_mut().zip(results).enumerate() {
             output.set_lane(lane, if number < summed { result } else { result.saturated() });
         }
@@ -410,6 +412,30 @@ pub fn with_care<W: WithCare<INPUTS, OUTPUTS>, T: Real, const INPUTS: usize, con
     }
     let mask = <T::Mask as Mask>::from_bits;
     (outputs, Flags { degenerate: mask(degenerate), kink: mask(kink) })
+}
+
+/// Returns the results at one input.
+fn of_one<W: WithCare<INPUTS, OUTPUTS>, T: Real, const INPUTS: usize, const OUTPUTS: usize>(
+    inputs: &[T::Unbounded; INPUTS],
+) -> ([T::Unbounded; OUTPUTS], Flags<T::Unbounded>) {
+    let mut plain = [0.0; INPUTS];
+    if doubles(inputs, &mut plain) && (W::compiled().is_outside)(&plain) {
+        let mut results = std::array::from_fn(|_| T::Unbounded::from_f64(0.0));
+        fill_outside(W::ROLES, &mut results);
+        return (results, Flags::degenerate());
+    }
+    let (mut results, care) = T::Unbounded::run_with_care::<W, INPUTS, OUTPUTS>(inputs);
+    let along = |rays: &[Ray]| {
+        let (results, care) = (W::compiled().ray)(rays.try_into().expect("as many rays as inputs"));
+        (!care.flags.degenerate).then(|| results.to_vec())
+    };
+    let flags = settle(inputs, W::ROLES, &mut results, care, &along);
+    (results, flags)
+}
+
+/// Writes the nearest doubles. Returns whether the type has them.
+pub(crate) fn doubles<T: Number>(numbers: &[T], nearest: &mut [f64]) -> bool {
+    nearest.iter_mut().zip(numbers).all(|(nearest, number)| number.double().map(|double| *nearest = double).is_some())
 }
 
 #[cfg(test)]

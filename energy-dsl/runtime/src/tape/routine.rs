@@ -2,7 +2,7 @@
 
 use super::instruction::Tape;
 use super::scalar::Values;
-use crate::numbers::{Flags, Fused, Level, Mask, Number, Ray, Roles, settle};
+use crate::numbers::{Baseline, Care, Flags, Fused, Level, Mask, Number, Ray, Roles, doubles, fill_outside, settle};
 
 /// The source of an input number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -90,8 +90,14 @@ pub struct General {
     pub results: Vec<u16>,
     /// Mask slots of inputs at which a result may be a convention: degenerate, kink.
     pub flags: [Option<u16>; 2],
+    /// Mask slots of inputs outside of the domain, and of conventions without a limit.
+    pub settled: [Option<u16>; 2],
+    /// A tape over the same inputs with a mask slot: the inputs outside of the domain; `None` if there are none.
+    pub outside: Option<(Tape, u16)>,
     /// Whether the first group is of values, not of derivatives.
     pub values_first: bool,
+    /// Whether the first group is an energy.
+    pub is_energy: bool,
     /// Index from which results are added to each other later.
     pub summed: usize,
 }
@@ -126,13 +132,9 @@ impl General {
     #[cold]
     pub(super) fn run<T: Number>(&self, sizes: &[usize], input: impl Fn(u16) -> T) -> (Vec<T>, Flags<T>) {
         let inputs: Vec<T::Unbounded> = self.inputs.iter().map(|&number| input(number).unbounded(0)).collect();
-        let (mut results, mut flags) = self.at(&inputs);
-        let roles = Roles { moves: &self.moves, groups: sizes, values_first: self.values_first };
-        let along = |rays: &[Ray]| {
-            let (results, flags) = self.at(rays);
-            (!flags.degenerate).then_some(results)
-        };
-        settle(&inputs, roles, &mut results, &mut flags, &along);
+        let (values_first, is_energy) = (self.values_first, self.is_energy);
+        let roles = Roles { moves: &self.moves, groups: sizes, values_first, is_energy };
+        let (results, flags) = self.settled(&inputs, roles);
         let bounded = |(number, value): (usize, T::Unbounded)| {
             let mut result = T::from_f64(0.0);
             result.set_lane(0, if number < self.summed { value } else { value.saturated() });
@@ -143,10 +145,32 @@ impl General {
         (results.into_iter().enumerate().map(bounded).collect(), flags)
     }
 
+    /// Returns all results, and whether they are limits.
+    fn settled<T: Number>(&self, inputs: &[T], roles: Roles<'_>) -> (Vec<T>, Flags<T>) {
+        let is_outside = |(tape, slot): &(Tape, u16)| {
+            let mut plain = vec![0.0; inputs.len()];
+            doubles(inputs, &mut plain) && tape.run::<f64, Baseline>(plain).mask(Some(*slot))
+        };
+        if self.outside.as_ref().is_some_and(is_outside) {
+            let mut results = vec![T::from_f64(0.0); self.results.len()];
+            fill_outside(roles, &mut results);
+            return (results, Flags::degenerate());
+        }
+        let (mut results, care) = self.at(inputs);
+        let along = |rays: &[Ray]| {
+            let (results, care) = self.at(rays);
+            (!care.flags.degenerate).then_some(results)
+        };
+        let flags = settle(inputs, roles, &mut results, care, &along);
+        (results, flags)
+    }
+
     /// Always runs with fused operations, as the general paths of generated code do.
-    fn at<T: Number>(&self, inputs: &[T]) -> (Vec<T>, Flags<T>) {
+    fn at<T: Number>(&self, inputs: &[T]) -> (Vec<T>, Care<T>) {
         let values = self.tape.run::<T, Fused>(inputs.iter().cloned());
-        (self.results.iter().map(|&slot| values.number(slot)).collect(), flags(&values, self.flags))
+        let [outside, definite] = self.settled.map(|slot| values.mask(slot));
+        let care = Care { flags: flags(&values, self.flags), outside, definite };
+        (self.results.iter().map(|&slot| values.number(slot)).collect(), care)
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::lanes::Lanes;
 use crate::numbers::elementary::{Binary, Unary};
-use crate::numbers::flags::Flags;
+use crate::numbers::limits::Care;
 use crate::numbers::lane::{Lane, check_transposed, gather_by_element, transpose_by_element};
 use crate::numbers::level::{Kernel, Level};
 use crate::numbers::real::{Mask, Number};
@@ -46,7 +46,7 @@ pub trait Scalar: Lane<Self> + Number<Mask = bool> + PartialOrd + Default {
     /// Runs the general path of a routine in this precision.
     fn run_unbounded<W: WithCare<INPUTS, OUTPUTS>, const INPUTS: usize, const OUTPUTS: usize>(
         inputs: &[Unbounded<Self>; INPUTS],
-    ) -> ([Unbounded<Self>; OUTPUTS], Flags<Unbounded<Self>>);
+    ) -> ([Unbounded<Self>; OUTPUTS], Care<Unbounded<Self>>);
 }
 
 macro_rules! scalar {
@@ -91,7 +91,7 @@ macro_rules! scalar {
             }
             fn run_unbounded<W: WithCare<INPUTS, OUTPUTS>, const INPUTS: usize, const OUTPUTS: usize>(
                 inputs: &[Unbounded<Self>; INPUTS],
-            ) -> ([Unbounded<Self>; OUTPUTS], Flags<Unbounded<Self>>) {
+            ) -> ([Unbounded<Self>; OUTPUTS], Care<Unbounded<Self>>) {
                 $run_with_care(inputs)
             }
         }
