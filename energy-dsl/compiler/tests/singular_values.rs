@@ -89,6 +89,32 @@ fn functions_of_two_singular_values_equal_functions_of_the_matrix() {
     pairs.into_iter().for_each(|(formula, other)| agree(formula, other, &matrices));
 }
 
+/// A tension field: no energy where both directions are slack, that of one direction, or that of both.
+#[test]
+fn conditions_may_depend_on_one_singular_value() {
+    let both = "(s[0]^2 * s[1]^2 + s[0]^2 + s[1]^2)";
+    let spectra = [[1.5, 1.5], [1.5, 1.5 - 1e-9], [1.5, 1.25]];
+    let matrices = spectra.map(|[first, second]| turned([first, second, 0.0])[..2].to_vec());
+    for formula in [
+        format!("(if s[0] <= 1 {{ 0 }} else {{ {both} }})"),
+        format!("(if s[0] <= 1 {{ 0 }} else {{ if s[1] <= 1 {{ s[0]^4 }} else {{ {both} }} }})"),
+        format!("2 * (if s[0] > 7 {{ s[0] }} else {{ {both} / 2 }})"),
+    ] {
+        agree(&formula, "det(transpose(F) * F) + ddot(F, F)", &matrices);
+    }
+    // Where one direction is slack, the energy is that of the other one.
+    let slack = turned([1.5, 0.5, 0.0])[..2].to_vec();
+    agree("(if s[1] <= 1 { s[0]^4 + 0 * s[1] } else { 0 })", "s[0]^4", &[slack]);
+}
+
+#[test]
+fn a_branch_without_symmetry_is_flagged_where_it_is_taken() {
+    let formula = "(if s[0] > 2 { s[0]^2 } else { s[0]^2 + s[1]^2 + s[2]^2 })";
+    assert_eq!(flags(formula, [1.0, 1.0, 0.5]), [false, false]);
+    assert_eq!(flags(formula, [3.0, 3.0, 0.5]), [true, false]);
+    assert_eq!(flags(formula, [3.0, 2.5, 0.5]), [false, false]);
+}
+
 /// Returns the flags at a diagonal matrix: degenerate, kink.
 fn flags(formula: &str, [a, b, c]: [f64; 3]) -> [bool; 2] {
     let flags = evaluate(&compiled(formula, 3), &[[a, 0.0, 0.0], [0.0, b, 0.0], [0.0, 0.0, c]]).1;

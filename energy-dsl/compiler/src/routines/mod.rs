@@ -117,11 +117,9 @@ impl Whole {
         Self { name: self.name, reduced, groups, hazards: Hazards { flags, sound, ..Hazards::default() } }
     }
 
-    /// Returns the mask where the sum of the values is finite.
+    /// Returns the mask where the sum of all results is finite. Before they are expanded to points, they are fewer.
     fn is_finite(&self, g: &mut Graph) -> NodeId {
-        // The results before they are expanded to points are fewer.
-        let values = if self.reduced.len() < self.groups[0].len() { &self.reduced } else { &self.groups[0] };
-        let (sum, infinity) = (g.sum(values.clone()), g.constant(f64::INFINITY));
+        let (sum, infinity) = (g.sum(self.reduced.clone()), g.constant(f64::INFINITY));
         let size = g.abs(sum);
         g.less(size, infinity)
     }

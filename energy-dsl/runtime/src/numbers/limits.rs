@@ -40,7 +40,11 @@ pub struct Care<T: Number> {
 
 /// Rays that are tried first: four opposite pairs.
 const FEW: usize = 8;
-/// Rays that tell a kink, where derivatives have some values, from a singularity, where each ray has its own.
+/// Rays that usually tell a singularity, where each ray has its own results: four more directions.
+const SOME: usize = 12;
+/// The fewest of them that must have results, which other rays may not have: they leave the formula's domain.
+const ENOUGH: usize = 5;
+/// Rays that tell a kink, where derivatives have some values, from a singularity.
 const MANY: usize = 24;
 
 /// Replaces results by their limits, or by the documented values where there is none, and sets the flags.
@@ -206,6 +210,33 @@ impl<'a> Rays<'a> {
         })
     }
 
+    /// Returns whether every group has limits, or a result that each ray has its own number or infinity for.
+    fn are_scattered(&self) -> bool {
+        self.groups().into_iter().zip(self.scales()).all(|(group, scale)| {
+            let agreements: Vec<Agreement> = group.clone().map(|i| self.agreement(i, scale)).collect();
+            let has_limits = agreements.iter().all(|a| matches!(a, Agreement::Number(_)));
+            has_limits || group.into_iter().any(|i| self.is_scattered(i, scale))
+        })
+    }
+
+    fn is_scattered(&self, result: usize, scale: Unbounded<f64>) -> bool {
+        let is_infinite = |path: &Path| matches!(path.limits[result], Limit::Infinite(_));
+        let (numbers, sides) = (self.numbers(result).count(), self.sides(result, scale).len());
+        // An even function has one result for two opposite directions: eight different ones for twelve rays.
+        self.paths.iter().any(is_infinite) || numbers >= ENOUGH && 3 * sides >= 2 * numbers
+    }
+
+    /// Returns the different limits of a result.
+    fn sides(&self, result: usize, scale: Unbounded<f64>) -> Vec<Unbounded<f64>> {
+        let mut sides: Vec<Unbounded<f64>> = Vec::new();
+        for number in self.numbers(result) {
+            if !sides.iter().any(|side| is_near(*side, number, scale)) {
+                sides.push(number);
+            }
+        }
+        sides
+    }
+
     /// Looks for rays into narrow regions where the formula takes another branch, with other results.
     fn cast_into_narrow_regions(&mut self) {
         let rays: Vec<Evaluated<'_>> = self.paths.iter().map(Path::evaluated).collect();
@@ -246,7 +277,10 @@ impl<'a> Rays<'a> {
         if self.agree() {
             self.cast_into_narrow_regions();
         } else {
-            self.cast(MANY);
+            self.cast(SOME);
+            if !self.are_scattered() {
+                self.cast(MANY);
+            }
         }
         let mut settled = Vec::with_capacity(plain.len());
         for (number, (range, scale)) in self.groups().into_iter().zip(self.scales()).enumerate() {
@@ -353,12 +387,7 @@ impl<'a> Rays<'a> {
             ([], [first, rest @ ..]) if rest.iter().all(|other| other == first) => Agreement::Infinite(*first),
             ([first, rest @ ..], []) if rest.iter().all(|x| is_near(*x, *first, scale)) => Agreement::Number(*first),
             (numbers, []) => {
-                let mut sides: Vec<Unbounded<f64>> = Vec::new();
-                for &number in numbers {
-                    if !sides.iter().any(|side| is_near(*side, number, scale)) {
-                        sides.push(number);
-                    }
-                }
+                let sides = self.sides(result, scale);
                 if 2 * sides.len() <= numbers.len() { Agreement::Sides } else { Agreement::None }
             }
             _ => Agreement::None,

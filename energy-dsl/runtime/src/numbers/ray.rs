@@ -42,9 +42,10 @@ pub struct Ray(u32);
 impl Ray {
     /// Returns what a routine computes at x + slope · ε, where `along` evaluates it.
     pub(super) fn evaluate(x: &[Unbounded<f64>], slopes: &[f64], along: Along<'_>) -> Found {
-        let short = Self::evaluate_to(LENGTHS[0], x, slopes, along);
+        let (short, may_tell_more) = Self::evaluate_to(LENGTHS[0], x, slopes, along);
         let is_known = |limits: &Vec<Limit>| !limits.iter().any(|limit| matches!(limit, Limit::Unknown));
-        if short.limits.as_ref().is_none_or(is_known) { short } else { Self::evaluate_to(LENGTHS[1], x, slopes, along) }
+        let suffices = !may_tell_more || short.limits.as_ref().is_none_or(is_known);
+        if suffices { short } else { Self::evaluate_to(LENGTHS[1], x, slopes, along).0 }
     }
 
     /// Returns what the routine would compute if some comparisons had the other outcome.
@@ -62,16 +63,17 @@ impl Ray {
 
     /// Returns the comparisons at x + slope · ε.
     pub(super) fn compare(x: &[Unbounded<f64>], slopes: &[f64], along: Along<'_>) -> Vec<Comparison> {
-        Self::evaluate_to(LENGTHS[0], x, slopes, along).comparisons
+        Self::evaluate_to(LENGTHS[0], x, slopes, along).0.comparisons
     }
 
-    fn evaluate_to(length: usize, x: &[Unbounded<f64>], slopes: &[f64], along: Along<'_>) -> Found {
-        let limits = with_length(length, || {
+    /// Returns also whether longer series might tell more.
+    fn evaluate_to(length: usize, x: &[Unbounded<f64>], slopes: &[f64], along: Along<'_>) -> (Found, bool) {
+        let (limits, may_tell_more) = with_length(length, || {
             let rays: Vec<Self> = x.iter().zip(slopes).map(|(&x, &slope)| Self::from(x, slope)).collect();
             along(&rays).map(|found| found.into_iter().map(Self::limit).collect())
         });
         SERIES.with_borrow_mut(Vec::clear);
-        Found { limits, comparisons: COMPARISONS.take() }
+        (Found { limits, comparisons: COMPARISONS.take() }, may_tell_more)
     }
 
     /// Creates x + slope · ε.

@@ -16,14 +16,17 @@ pub(super) const LENGTHS: [usize; 2] = [4, 10];
 thread_local! {
     /// Terms that a series keeps.
     static LENGTH: Cell<usize> = const { Cell::new(LENGTHS[1]) };
+    /// Whether a result is unknown because all known terms of a series cancelled.
+    static IS_SHORT: Cell<bool> = const { Cell::new(false) };
 }
 
-/// Evaluates with series of at most this many terms.
-pub(super) fn with_length<R>(length: usize, evaluate: impl FnOnce() -> R) -> R {
+/// Evaluates with series of at most this many terms. Returns also whether more terms might tell more.
+pub(super) fn with_length<R>(length: usize, evaluate: impl FnOnce() -> R) -> (R, bool) {
     LENGTH.set(length);
+    IS_SHORT.set(false);
     let result = evaluate();
     LENGTH.set(LENGTHS[1]);
-    result
+    (result, IS_SHORT.get())
 }
 
 /// A sum this small against everything that it was computed from is rounding: its terms cancel.
@@ -176,6 +179,13 @@ impl Series {
         Self { terms: kept, unknown }
     }
 
+    /// Notes that terms are missing, unless the series is undefined or 0.
+    fn note_short(&self) {
+        if self.is_defined() && !self.is_zero() {
+            IS_SHORT.set(true);
+        }
+    }
+
     pub(super) fn is_defined(&self) -> bool {
         self.unknown.power > f64::NEG_INFINITY
     }
@@ -249,13 +259,17 @@ impl Series {
 
     /// Splits t (1 + r) into t and the infinitesimal r; `None` if no term is known.
     fn split(&self) -> Option<(Term, Self)> {
-        let first = *self.terms.first()?;
+        let Some(&first) = self.terms.first() else {
+            self.note_short();
+            return None;
+        };
         Some((first, Self { terms: self.terms[1..].to_vec(), ..*self }.over(first)))
     }
 
     /// Splits c + r into the number c and the infinitesimal r; `None` if it is not finite.
     pub(super) fn finite(&self) -> Option<(f64, Self)> {
         if !Order::ONE.is_larger_than(self.unknown) {
+            self.note_short();
             return None;
         }
         match self.terms.first() {
@@ -315,7 +329,7 @@ impl Series {
             let size = factor(constant).exp::<Baseline>();
             return rest.composed(|k| 1.0 / factorial(k)).times(&Self::constant(size));
         }
-        let Some(first) = self.terms.first().copied() else { return Self::undefined() };
+        let Some((first, _)) = self.split() else { return Self::undefined() };
         // e^(a ln(1/ε) + r) = ε^(−a) eʳ.
         if first.order.compare(Order { power: 0.0, logs: 1.0 }) == Ordering::Equal {
             let order = Order { power: first.factor.to_scalar(), logs: 0.0 };
@@ -384,7 +398,11 @@ impl Series {
 
     pub(super) fn limit(&self) -> Limit {
         let Some(first) = self.terms.first() else {
-            return if Order::ONE.is_larger_than(self.unknown) { Limit::Finite(factor(0.0)) } else { Limit::Unknown };
+            if Order::ONE.is_larger_than(self.unknown) {
+                return Limit::Finite(factor(0.0));
+            }
+            self.note_short();
+            return Limit::Unknown;
         };
         match first.order.compare(Order::ONE) {
             Ordering::Less => Limit::Infinite(self.sign()),

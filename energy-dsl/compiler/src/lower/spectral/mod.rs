@@ -20,10 +20,12 @@ use crate::functions::Lowered;
 use crate::graph::{Dependence, Graph, NodeId, Primitive, Rule, Spectrum};
 use energy_runtime::Flag;
 use reflection::{DividedDifference, Reflection};
-use symmetry::is_unchanged;
+use symmetry::{Branches, conditions};
 
 /// Singular values closer than this part of the largest one are equal up to rounding.
 const ROUNDING: f64 = 4e-15;
+/// Of functions with more conditions, the branches are not looked at: their number doubles with each.
+const MOST_CONDITIONS: usize = 5;
 
 /// Turns functions of singular values into rules where they meet other moving numbers.
 #[derive(Default)]
@@ -134,6 +136,9 @@ fn modes(g: &mut Graph, psi: NodeId, slopes: &[NodeId], spectrum: &Spectrum) -> 
 }
 
 /// Returns the quotient that belongs to a reflection, and where it has no limit.
+///
+/// Conditions of selections keep their outcome in it: the branch that is taken counts, which may be symmetric where the
+/// condition is not.
 fn quotient(
     g: &mut Graph,
     psi: NodeId,
@@ -141,9 +146,21 @@ fn quotient(
     reflection: &Reflection,
     largest: NodeId,
 ) -> (NodeId, Option<NodeId>) {
-    if is_unchanged(g, psi, &reflection.images) {
-        return (DividedDifference::new(g, reflection).of(g, slope), None);
+    let conditions = Some(conditions(g, psi)).filter(|all| all.len() <= MOST_CONDITIONS).unwrap_or_default();
+    let branches = Branches::of(g, psi, &reflection.images, &conditions);
+    let symmetric = |g: &mut Graph| DividedDifference::new(g, reflection, &conditions).of(g, slope);
+    match branches {
+        Branches::Symmetric => (symmetric(g), None),
+        Branches::Asymmetric => plain_quotient(g, reflection, largest),
+        Branches::SymmetricWhere(mask) => {
+            let (smooth, (plain, singular)) = (symmetric(g), plain_quotient(g, reflection, largest));
+            let asymmetric = g.not(mask);
+            (g.select(mask, smooth, plain), singular.map(|singular| g.and(asymmetric, singular)))
+        }
     }
+}
+
+fn plain_quotient(g: &mut Graph, reflection: &Reflection, largest: NodeId) -> (NodeId, Option<NodeId>) {
     let zero = g.constant(0.0);
     if g.is(reflection.numerator, 0.0) {
         return (zero, None);

@@ -79,10 +79,12 @@ pub(super) struct DividedDifference {
 }
 
 impl DividedDifference {
-    pub(super) fn new(g: &mut Graph, reflection: &Reflection) -> Self {
+    /// Prepares quotients in which some conditions keep their outcome.
+    pub(super) fn new(g: &mut Graph, reflection: &Reflection, conditions: &[NodeId]) -> Self {
         let moved = reflection.images.iter().zip(&reflection.changes);
         let known = moved.map(|(&(value, _), &change)| (value, g.constant(change))).collect();
-        let image = Substitution::new(g, reflection.images.iter().copied());
+        let kept = conditions.iter().map(|&condition| (condition, condition));
+        let image = Substitution::new(g, reflection.images.iter().copied().chain(kept));
         Self { image, distance: reflection.distance, known }
     }
 
@@ -304,7 +306,7 @@ mod tests {
         let values = [0, 1].map(|i| g.input(Input::Position(i)));
         let reflection = Reflection::exchange(g, &values, &values, (0, 1));
         let f = formula(g, values[0], values[1]);
-        let found = DividedDifference::new(g, &reflection).of(g, f);
+        let found = DividedDifference::new(g, &reflection, &[]).of(g, f);
         let mirrored = formula(g, values[1], values[0]);
         let inputs = Inputs { parameters: &[], rest: &[], positions: &[a, b], velocities: &[] };
         let numbers = Interpreter::new(g, &[found, f, mirrored]).evaluate(&inputs, &[]);

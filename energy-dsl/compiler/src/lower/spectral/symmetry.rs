@@ -1,5 +1,7 @@
 //! Finds out whether a function of singular values stays the same after a reflection, by trying numbers.
 
+use std::collections::BTreeSet;
+
 use crate::graph::{Graph, Input, Interpreter, NodeId, Op, Substitution};
 use energy_runtime::Inputs;
 
@@ -8,14 +10,78 @@ const POINTS: u32 = 6;
 /// Functions that differ by less, relative to their size, are equal.
 const TOLERANCE: f64 = 1e-9;
 
-/// Returns whether ψ is the same after a reflection, which maps all singular values to images.
-pub(super) fn is_unchanged(g: &mut Graph, psi: NodeId, images: &[(NodeId, NodeId)]) -> bool {
+/// The branches of ψ that stay the same after a reflection.
+pub(super) enum Branches {
+    Symmetric,
+    Asymmetric,
+    /// Those that are taken where the mask holds.
+    SymmetricWhere(NodeId),
+}
+
+impl Branches {
+    /// Tries all outcomes of the conditions.
+    pub(super) fn of(g: &mut Graph, psi: NodeId, images: &[(NodeId, NodeId)], conditions: &[NodeId]) -> Self {
+        let (mut symmetric, count) = (Vec::new(), 1_usize << conditions.len());
+        for branch in 0..count {
+            let outcomes: Vec<bool> = (0..conditions.len()).map(|i| branch >> i & 1 == 1).collect();
+            let known = conditions.iter().zip(&outcomes).map(|(&mask, &outcome)| (mask, g.truth(outcome)));
+            let known: Vec<(NodeId, NodeId)> = known.collect();
+            if is_unchanged(g, psi, images, &known) {
+                symmetric.push(outcomes);
+            }
+        }
+        if symmetric.is_empty() {
+            return Self::Asymmetric;
+        }
+        if symmetric.len() == count {
+            return Self::Symmetric;
+        }
+        let mut mask = g.truth(false);
+        for outcomes in symmetric {
+            let literals = conditions.iter().zip(outcomes).map(|(&mask, holds)| if holds { mask } else { g.not(mask) });
+            let literals: Vec<NodeId> = literals.collect();
+            let always = g.truth(true);
+            let taken = literals.into_iter().fold(always, |all, literal| g.and(all, literal));
+            mask = g.or(mask, taken);
+        }
+        Self::SymmetricWhere(mask)
+    }
+}
+
+/// Returns the moving conditions of the selections in a formula, seen from outside of robust primitives.
+pub(super) fn conditions(g: &Graph, psi: NodeId) -> Vec<NodeId> {
+    let (mut found, mut seen, mut stack) = (BTreeSet::new(), BTreeSet::new(), vec![psi]);
+    while let Some(node) = stack.pop() {
+        if !seen.insert(node) {
+            continue;
+        }
+        match (g.rule(node), g.op(node)) {
+            (Some(rule), _) => stack.extend(rule.arguments.iter().chain(&rule.inner)),
+            (None, Op::Select(mask, yes, no)) => {
+                stack.extend([yes, no]);
+                found.extend(Some(mask).filter(|&mask| g.varies(mask)));
+            }
+            (None, op) => stack.extend(op.operands()),
+        }
+    }
+    found.into_iter().collect()
+}
+
+/// Returns whether ψ is the same after a reflection, which maps all singular values to images, where the outcomes of
+/// some conditions are known.
+fn is_unchanged(
+    g: &mut Graph,
+    psi: NodeId,
+    images: &[(NodeId, NodeId)],
+    known: &[(NodeId, NodeId)],
+) -> bool {
     // Each singular value becomes an input.
     let inputs: Vec<NodeId> = (0..images.len()).map(|i| g.input(Input::Position(i as u16))).collect();
-    let mut plain = Substitution::new(g, images.iter().map(|(value, _)| *value).zip(inputs));
+    let values = images.iter().map(|(value, _)| *value).zip(inputs);
+    let mut plain = Substitution::new(g, values.chain(known.iter().copied()));
     let mirrored: Vec<(NodeId, NodeId)> = images.iter().map(|&(value, image)| (value, plain.of(g, image))).collect();
     let before = plain.of(g, psi);
-    let after = Substitution::new(g, mirrored).of(g, psi);
+    let after = Substitution::new(g, mirrored.into_iter().chain(known.iter().copied())).of(g, psi);
     if before == after {
         return true;
     }
