@@ -67,8 +67,7 @@ impl Decomposition {
                 }
                 let ratio = (&gram[q][q] - &gram[p][p]) / (&gram[p][q] * big(2.0));
                 let size = root(&(&ratio * &ratio + big(1.0)));
-                let tangent =
-                    if ratio < big(0.0) { big(-1.0) / (size - &ratio) } else { big(1.0) / (size + &ratio) };
+                let tangent = if ratio < big(0.0) { big(-1.0) / (size - &ratio) } else { big(1.0) / (size + &ratio) };
                 let cosine = big(1.0) / root(&(&tangent * &tangent + big(1.0)));
                 let sine = &tangent * &cosine;
                 let turn = matrix(|i, j| match (i, j) {
@@ -137,8 +136,7 @@ fn second_rates(f: &Matrix, rates: &[Matrix], gap: f64) -> Vec<Vec<Matrix>> {
         let mut moved = f.clone();
         moved[entry / 3][entry % 3] = &moved[entry / 3][entry % 3] + &step;
         let there = Decomposition::new(&moved).rotation_rates();
-        let difference =
-            |(there, here): (&Matrix, &Matrix)| matrix(|i, j| (&there[i][j] - &here[i][j]) / &step);
+        let difference = |(there, here): (&Matrix, &Matrix)| matrix(|i, j| (&there[i][j] - &here[i][j]) / &step);
         there.iter().zip(rates).map(difference).collect()
     };
     (0..9).map(by).collect()
@@ -180,11 +178,19 @@ impl Worst {
 }
 
 fn largest(pairs: impl Iterator<Item = (f64, Big)>) -> f64 {
-    pairs.map(|(got, truth)| if got.is_finite() { double(&(big(got) - truth)).abs() } else { f64::INFINITY }).fold(0.0, f64::max)
+    pairs
+        .map(|(got, truth)| if got.is_finite() { double(&(big(got) - truth)).abs() } else { f64::INFINITY })
+        .fold(0.0, f64::max)
 }
 
 /// Compares all functions of one matrix. Returns whether it was flagged.
-fn compare<S: Float + Into<f64>>(subjects: &Subjects, entries: [f64; 9], u: f64, with_second: bool, worst: &mut Worst) -> bool {
+fn compare<S: Float + Into<f64>>(
+    subjects: &Subjects,
+    entries: [f64; 9],
+    u: f64,
+    with_second: bool,
+    worst: &mut Worst,
+) -> bool {
     let f: Matrix = matrix(|i, j| big(entries[3 * i + j]));
     let truth = Decomposition::new(&f);
     let sums = [(0, 1), (0, 2), (1, 2)].map(|(i, j)| double(&(&truth.values[i] + &truth.values[j])));
@@ -215,7 +221,9 @@ fn compare<S: Float + Into<f64>>(subjects: &Subjects, entries: [f64; 9], u: f64,
     worst.record("S", error / (50.0 * u * size), place);
     let error = largest((0..81).map(|k| (turn[1][k], rates[k % 9][k / 9 / 3][k / 9 % 3].clone())));
     worst.record("first derivatives", error * gap / (50.0 * u * kappa.max(1.0)), place);
-    if with_second {
+    // In single precision, the inverse square of a small gap may be infinite.
+    let has_second = Into::<f64>::into(S::from_f64(100.0 / (gap * gap))).is_finite();
+    if with_second && has_second {
         let second = second_rates(&f, &rates, gap);
         for entry in 0..9 {
             let mut weights = [S::from_f64(0.0); 9];

@@ -42,7 +42,7 @@ pub struct TermCost {
     pub energy: f64,
     /// Number of elements.
     pub elements: usize,
-    /// Number of elements left out because they met a singularity.
+    /// Number of elements whose Jacobians are left out because they met a singularity.
     pub degenerate: usize,
 }
 

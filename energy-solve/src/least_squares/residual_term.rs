@@ -9,9 +9,9 @@ use crate::least_squares::normal_matrix::{Couplings, NormalMatrix, WIDTH, WideBl
 /// The energy of a term.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct TermSum {
-    /// λ Σ w ρ(‖r‖²).
+    /// λ Σ w ρ(‖r‖²); infinite if the residual of an element has no value.
     pub energy: f64,
-    /// Number of elements that met a singularity and are left out of every sum.
+    /// Number of elements that met a singularity. Their Jacobians are left out.
     pub degenerate: usize,
 }
 
@@ -230,6 +230,8 @@ struct Chunk {
     jacobians: Vec<f64>,
     /// Elements that met a singularity, counted from the chunk's first.
     degenerate: Vec<usize>,
+    /// Those of them whose residual has no value.
+    undefined: Vec<usize>,
 }
 
 impl<E: PackedResidual<f64> + Debug, const D: usize> ResidualTerm<E, D> {
@@ -239,6 +241,7 @@ impl<E: PackedResidual<f64> + Debug, const D: usize> ResidualTerm<E, D> {
         chunk.degenerate.clear();
         chunk.residuals.resize(CHUNK * Self::rows(), 0.0);
         dispatch(Residuals { term: self, x, first, count, chunk });
+        chunk.undefined.clone_from(&chunk.degenerate);
         count
     }
 
@@ -250,22 +253,29 @@ impl<E: PackedResidual<f64> + Debug, const D: usize> ResidualTerm<E, D> {
         // Rows are read as whole registers, which reaches past the end of the last block.
         chunk.jacobians.resize(CHUNK * Self::rows() * self.couplings.arity() * D + WIDTH, 0.0);
         dispatch(Jacobians { term: self, x, first, count, chunk });
+        chunk.undefined.clear();
+        if !chunk.degenerate.is_empty() {
+            let mut values = Chunk::default();
+            self.evaluate_chunk(first, x, &mut values);
+            chunk.undefined = values.undefined;
+        }
         count
     }
 
-    /// Calls `each` with an element's index, its energy, and the square root of its weight. Elements that met a
-    /// singularity have zero weight, unless their residual is infinite.
+    /// Calls `each` with an element's index, its energy, and the square root of its weight. A residual without a value
+    /// has an infinite energy, so that no line search accepts it. At a singularity of derivatives, the weight is 0.
     fn weigh(&self, first: usize, count: usize, chunk: &Chunk, mut each: impl FnMut(usize, f64, f64)) {
         let rows = Self::rows();
         for at in 0..count {
             let square: f64 = chunk.residuals[at * rows..][..rows].iter().map(|r| r * r).sum();
-            if square.is_finite() && chunk.degenerate.contains(&at) {
-                each(at, 0.0, 0.0);
+            let weight = self.lambda * self.weights[first + at];
+            if weight > 0.0 && chunk.undefined.contains(&at) {
+                each(at, f64::INFINITY, 0.0);
                 continue;
             }
             let (loss, slope) = self.loss.of(square);
-            let weight = self.lambda * self.weights[first + at];
-            each(at, weight * loss, (weight * slope).sqrt());
+            let is_regular = !square.is_finite() || !chunk.degenerate.contains(&at);
+            each(at, weight * loss, if is_regular { (weight * slope).sqrt() } else { 0.0 });
         }
     }
 }

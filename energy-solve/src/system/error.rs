@@ -45,7 +45,7 @@ pub enum EvaluationError {
         /// The position or velocity.
         value: Vector3<f64>,
     },
-    /// The force or energy of an element is infinite or NaN.
+    /// The force or energy of an element is infinite or NaN. An energy is infinite outside of its formula's domain.
     #[error(
         "{term}: element {element} on vertices {vertices:?} has a non-finite {what} at finite positions and velocities"
     )]

@@ -44,7 +44,7 @@ impl System {
     /// The system keeps the constant part of each matrix, so pass the same matrix to every step.
     ///
     /// # Errors
-    /// If the state is incomplete or not finite, or a force is not finite.
+    /// If the state is incomplete or not finite, a force is not finite, or an element is outside of its formula's domain.
     ///
     /// # Panics
     /// If the matrix was not created by this system.
@@ -61,7 +61,7 @@ impl System {
     /// [`System::linearise`]. Masses belong to the constant part of the matrix.
     ///
     /// # Errors
-    /// If the state is incomplete or not finite, or a force is not finite.
+    /// If the state is incomplete or not finite, a force is not finite, or an element is outside of its formula's domain.
     ///
     /// # Panics
     /// If the matrix was not created by this system, or the number of masses is neither zero nor that of the vertices.
@@ -100,20 +100,21 @@ impl System {
         let mut sums = Sums { weights, curvature, matrix: values, force: &mut force, product: product_wanted };
         let part = constant.as_ref().map(|(part, _)| &self.constants[*part]);
         let divided = division::linearisations(&self.divisible(linear), &self.shares, state, part, &mut sums);
-        let mut sum = sums.linearisation();
+        let (mut sum, mut flagged) = (sums.linearisation(), 0);
         for (Counted { term, counts }, divided) in self.terms.iter_mut().zip(divided) {
             if linear(&**term) {
-                counts.hessian += divided.unwrap_or_else(|| term.add_linearisation(state, &mut sum));
+                let tally = divided.unwrap_or_else(|| term.add_linearisation(state, &mut sum));
+                flagged += tally.flagged;
+                counts.hessian += tally;
             } else {
                 let tally = divided.unwrap_or_else(|| term.add_force(state, sum.force));
+                flagged += tally.flagged;
                 counts.reused += if term.character().curved { tally.evaluated } else { 0 };
                 counts.gradient += tally;
             }
         }
         matrix.set_contents(constant.map(|(_, contents)| contents));
-        if force.iter().flatten().any(|component| !component.is_finite()) {
-            return Err(self.find_non_finite_force(state));
-        }
+        self.check_results(state, flagged, &force)?;
         if !with_constant {
             add_masses(&self.dofs, &self.pattern, masses, matrix.values_mut());
         }

@@ -208,8 +208,11 @@ impl System {
     /// Returns the energy of each term, summed over the elements with a free vertex; the energy of the others is
     /// constant. Energies that came with forces or Jacobians at the same positions are reused.
     ///
+    /// A term is infinite if one of its elements is outside of its formula's domain, such as an inverted element with a
+    /// logarithm of its volume. A line search that compares energies rejects such positions.
+    ///
     /// # Errors
-    /// If positions are missing or not finite, or an energy is not finite.
+    /// If positions are missing or not finite, or an energy is not a number.
     pub fn energies(&mut self, x: &[Vector3<f64>]) -> Result<Vec<TermEnergy<'_>>, EvaluationError> {
         self.check_state("position", x)?;
         let known = self.evaluated_at == x;
@@ -230,7 +233,7 @@ impl System {
             let evaluated = if found.is_some() { None } else { divided.or_else(|| term.energy(x)) };
             counts.value += evaluated.map_or_else(Tally::default, |(_, tally)| tally);
             let energy = found.or(evaluated.map(|(energy, _)| energy));
-            if energy.is_some_and(|energy| !energy.is_finite()) {
+            if energy.is_some_and(|energy| energy.is_nan() || energy == f64::NEG_INFINITY) {
                 return Err(blame(std::iter::once(&**term), Quantity::Energy, State { x, v: &[] }));
             }
             energies.push(TermEnergy { term: term.name(), energy });
@@ -296,19 +299,34 @@ impl System {
     /// Returns f(x, v) of all vertices, in N. Pinned vertices get the force of the elements they share with free ones.
     ///
     /// # Errors
-    /// If the state or a force is incomplete or not finite.
+    /// If the state or a force is incomplete or not finite, or an element is outside of its formula's domain.
     pub fn forces(&mut self, state: State<'_>) -> Result<Vec<Vector3<f64>>, EvaluationError> {
         self.check(state)?;
         let mut force = vec![[0.0; 3]; self.dofs.vertex_count()];
         state.x.clone_into(&mut self.evaluated_at);
         let divided = division::forces(&self.divisible(|_| false), &self.shares, state, &mut force);
+        let mut flagged = 0;
         for (Counted { term, counts }, divided) in self.terms.iter_mut().zip(divided) {
-            counts.gradient += divided.unwrap_or_else(|| term.add_force(state, &mut force));
+            let tally = divided.unwrap_or_else(|| term.add_force(state, &mut force));
+            flagged += tally.flagged;
+            counts.gradient += tally;
         }
-        if force.iter().flatten().any(|component| !component.is_finite()) {
-            return Err(self.find_non_finite_force(state));
-        }
+        self.check_results(state, flagged, &force)?;
         Ok(force)
+    }
+
+    /// Checks the results of a sum with this number of flagged elements: forces must be finite, and so must be the
+    /// energies that came with them. Outside of a formula's domain, forces are 0.
+    fn check_results(&self, state: State<'_>, flagged: u64, force: &[Vector3<f64>]) -> Result<(), EvaluationError> {
+        let terms = || self.terms.iter().map(|counted| &*counted.term);
+        if force.iter().flatten().any(|component| !component.is_finite()) {
+            return Err(blame(terms(), Quantity::Force, state));
+        }
+        let is_outside = |term: &&dyn PlacedTerm| term.energy_found() == Some(f64::INFINITY);
+        match terms().find(|term| flagged > 0 && is_outside(term)) {
+            Some(term) => Err(blame(std::iter::once(term), Quantity::Energy, state)),
+            None => Ok(()),
+        }
     }
 
     fn check(&self, state: State<'_>) -> Result<(), EvaluationError> {
@@ -326,10 +344,6 @@ impl System {
             Some(vertex) => Err(EvaluationError::NonFiniteState { what, vertex, value: vectors[vertex] }),
             None => Ok(()),
         }
-    }
-
-    fn find_non_finite_force(&self, state: State<'_>) -> EvaluationError {
-        blame(self.terms.iter().map(|counted| &*counted.term), Quantity::Force, state)
     }
 }
 

@@ -205,9 +205,7 @@ impl<'a> Rays<'a> {
 
     fn agree(&self) -> bool {
         let mut groups = self.groups().into_iter().zip(self.scales());
-        groups.all(|(group, scale)| {
-            group.into_iter().all(|i| matches!(self.agreement(i, scale), Agreement::Number(_)))
-        })
+        groups.all(|(group, scale)| group.into_iter().all(|i| matches!(self.agreement(i, scale), Agreement::Number(_))))
     }
 
     /// Returns whether every group has limits, or a result that each ray has its own number or infinity for.

@@ -3,8 +3,8 @@ use std::ops::{Add, BitAnd, BitOr, Div, Mul, Neg, Not, Sub};
 
 use super::cpu::{Scalar, dispatch_scalar};
 use super::elementary::{Atan2, Binary, Cos, Exp, Ln, ModerateAtan2, Pow, Sin, Unary, sin_cos};
-use super::limits::Care;
 use super::level::{Baseline, Kernel, Level};
+use super::limits::Care;
 use super::unbounded::{Unbounded, WithCare};
 
 /// The outcome of a comparison: a `bool`, or one per lane.

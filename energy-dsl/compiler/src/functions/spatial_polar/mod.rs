@@ -271,4 +271,3 @@ fn cross_with_axis(g: &mut Graph, axis: usize, v: &Vector) -> Vector {
     result[last] = v[next];
     result
 }
-

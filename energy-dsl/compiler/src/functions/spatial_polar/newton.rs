@@ -44,16 +44,20 @@ pub(super) fn compliance(g: &mut Graph, stretch: &Matrix) -> Inverse {
     inverted(g, &stiffness)
 }
 
-/// Returns R after a step of Newton's method with a given K⁻¹, whose errors are nearly those of rounding R. With the
+/// Returns R after a step of Newton's method, whose errors are nearly those of rounding R. `turn` returns K⁻¹ a. With the
 /// error H = (RᵀR − I)/2 of orthogonality, the step is R (I − H + [K⁻¹ a]ₓ) with \[a\]ₓ = M − Mᵀ − (H M − M H) and M = RᵀF.
 /// H and M − Mᵀ, which cancel, are computed with twice the digits.
-pub(super) fn refined(g: &mut Graph, r: &Matrix, f: &Matrix, inverse: impl Fn(&mut Graph, &Vector) -> Vector) -> Matrix {
+pub(super) fn refined(
+    g: &mut Graph,
+    r: &Matrix,
+    f: &Matrix,
+    turn: impl FnOnce(&mut Graph, &Vector) -> Vector,
+) -> Matrix {
     let (columns, half, minus_one, one) = (transposed(r), g.constant(0.5), g.constant(-1.0), g.constant(1.0));
     let of_f = transposed(f);
     let negative = columns.map(|column| column.map(|entry| g.neg(entry)));
-    let skew = [(2, 1), (0, 2), (1, 0)].map(|(i, j)| {
-        compensated_dot(g, &[columns[i], negative[j]].concat(), &[of_f[j], of_f[i]].concat())
-    });
+    let skew = [(2, 1), (0, 2), (1, 0)]
+        .map(|(i, j)| compensated_dot(g, &[columns[i], negative[j]].concat(), &[of_f[j], of_f[i]].concat()));
     let error: Matrix = {
         let mut error = [[half; 3]; 3];
         for i in 0..3 {
@@ -79,7 +83,7 @@ pub(super) fn refined(g: &mut Graph, r: &Matrix, f: &Matrix, inverse: impl Fn(&m
         let minus = g.sub(spoilt[i][j], spoilt[j][i]);
         g.sub(skew[k], minus)
     });
-    let turn = inverse(g, &spin);
+    let turn = turn(g, &spin);
     r.map(|row| {
         let change = g.cross(&row, &turn);
         std::array::from_fn(|j| {

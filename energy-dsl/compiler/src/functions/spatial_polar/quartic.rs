@@ -18,7 +18,7 @@ use crate::graph::{Form, Graph, NodeId};
 const TEXTBOOK_STEPS: usize = 10;
 /// The largest condition numbers for which two steps of Newton's method correct the errors of R: in double precision and
 /// in single precision.
-const LARGEST_CONDITION: (f64, f64) = (1e4, 32.0);
+const LARGEST_CONDITION: (f64, f64) = (500.0, 32.0);
 /// The largest ratio (σ₂ − σ₃)/(σ₂ + σ₃). It amplifies the errors of R in S.
 const LARGEST_REFLECTION: f64 = 16.0;
 
@@ -218,4 +218,3 @@ fn between_minus_one_and_one(g: &mut Graph, cosine: NodeId, divisor: NodeId) -> 
     let below = g.min(cosine, one);
     g.max(below, minus_one)
 }
-

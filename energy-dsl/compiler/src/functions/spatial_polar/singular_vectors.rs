@@ -9,10 +9,12 @@ use super::{Factors, Lowered};
 use crate::functions::singular::Decomposition;
 use crate::graph::{Graph, NodeId};
 
-/// Steps of refinement. Each one divides the errors of R by 1/(u κ).
+/// Steps of refinement. Each one multiplies the errors of R by about u κ.
 const STEPS: usize = 3;
 /// Larger corrections of R are errors of σ₂ + σ₃, which is nearly 0.
 const LARGEST_TURN: f64 = 0.125;
+/// Larger ratios of consecutive corrections are rounding.
+const LARGEST_RATIO: f64 = 0.25;
 /// If σ₂ + σ₃ is less than this part of σ₁, then R is taken as 0: 400 roundoffs, in double and in single precision.
 const LEAST_GAP: (f64, f64) = (4.4e-14, 2.4e-5);
 
@@ -38,6 +40,7 @@ pub(super) fn factors(g: &mut Graph, arguments: &[NodeId], f: &Matrix) -> (Facto
     let columns = transposed(&axes);
     let mut rotation = transposed(&images).map(|row| columns.map(|column| g.dot(&row, &column)));
     let largest = g.constant(LARGEST_TURN * LARGEST_TURN);
+    let mut before: Option<Vector> = None;
     for _ in 0..STEPS {
         rotation = refined(g, &rotation, f, |g, spin| {
             let along: Vector = std::array::from_fn(|k| {
@@ -45,14 +48,33 @@ pub(super) fn factors(g: &mut Graph, arguments: &[NodeId], f: &Matrix) -> (Facto
                 g.mul(compliances[k], component)
             });
             let turn = columns.map(|column| g.dot(&column, &along));
+            let turn = match before {
+                Some(before) => extrapolated(g, &before, &turn),
+                None => turn,
+            };
             let square = g.dot(&turn, &turn);
             let is_small = g.less(square, largest);
-            turn.map(|component| g.select(is_small, component, zero))
+            let turn = turn.map(|component| g.select(is_small, component, zero));
+            before = Some(turn);
+            turn
         });
     }
     let rotation = rotation.map(|row| row.map(|entry| g.select(singular, zero, entry)));
     let trace = g.sum(lengths);
     (Factors { rotation, stretch, inverse, trace }, singular)
+}
+
+/// Returns the limit of the sum of all further turns. They form a geometric series, whose ratio is the relative error of
+/// σ₂ + σ₃ (Aitken's extrapolation).
+fn extrapolated(g: &mut Graph, before: &Vector, turn: &Vector) -> Vector {
+    let [zero, one, largest] = [0.0, 1.0, LARGEST_RATIO].map(|number| g.constant(number));
+    let (along, square) = (g.dot(turn, before), g.dot(before, before));
+    let ratio = g.div(along, square);
+    let size = g.abs(ratio);
+    let converges = g.less(size, largest);
+    let ratio = g.select(converges, ratio, zero);
+    let rest = g.sub(one, ratio);
+    turn.map(|component| g.div(component, rest))
 }
 
 /// Returns Σ wₖ vₖ vₖᵀ.

@@ -69,12 +69,7 @@ pub(super) fn conditions(g: &Graph, psi: NodeId) -> Vec<NodeId> {
 
 /// Returns whether ψ is the same after a reflection, which maps all singular values to images, where the outcomes of
 /// some conditions are known.
-fn is_unchanged(
-    g: &mut Graph,
-    psi: NodeId,
-    images: &[(NodeId, NodeId)],
-    known: &[(NodeId, NodeId)],
-) -> bool {
+fn is_unchanged(g: &mut Graph, psi: NodeId, images: &[(NodeId, NodeId)], known: &[(NodeId, NodeId)]) -> bool {
     // Each singular value becomes an input.
     let inputs: Vec<NodeId> = (0..images.len()).map(|i| g.input(Input::Position(i as u16))).collect();
     let values = images.iter().map(|(value, _)| *value).zip(inputs);

@@ -2,9 +2,9 @@
 
 use super::lanes::Lanes;
 use crate::numbers::elementary::{Binary, Unary};
-use crate::numbers::limits::Care;
 use crate::numbers::lane::{Lane, check_transposed, gather_by_element, transpose_by_element};
 use crate::numbers::level::{Kernel, Level};
+use crate::numbers::limits::Care;
 use crate::numbers::real::{Mask, Number};
 use crate::numbers::unbounded::{Unbounded, WithCare};
 
