@@ -4,6 +4,7 @@
 mod arrays;
 mod batch;
 mod constants;
+mod domain;
 mod include;
 mod kinds;
 mod lanes;
@@ -11,6 +12,7 @@ mod limits;
 mod matrices;
 mod polar;
 mod quadrature;
+mod range;
 mod recognition;
 mod reference;
 mod singular;

@@ -173,3 +173,26 @@ fn a_solid_without_a_rotation_is_flagged() {
         );
     }
 }
+
+/// Rotations and energies of needles and near mirror images, whose errors σ₁/(σ₂ + σ₃) amplifies.
+#[test]
+fn needles_and_near_mirror_images_keep_their_rotation() {
+    for diagonal in [
+        [1.0, 1e-5, 1e-8],
+        [1.0, 3e-7, 3e-7],
+        [1.0, 1e-3, -9.99e-4],
+        [1.0, 1e-4, -9.9e-5],
+        [1.0, 1.0, -0.999_999],
+        [1.0, 1e-10, -9e-11],
+    ] {
+        let f: [f64; 9] = std::array::from_fn(|entry| if entry % 4 == 0 { diagonal[entry / 4] } else { 0.0 });
+        let at = RigidSolid::new().residual(&f);
+        let kappa = diagonal[0] / (diagonal[1] + diagonal[2]);
+        for (entry, found) in at.value.iter().enumerate() {
+            let expected = if entry % 4 == 0 { diagonal[entry / 4] - 1.0 } else { 0.0 };
+            let error: f64 = found - expected;
+            assert!(error.abs() <= 6e-15 * kappa, "{diagonal:?}: {found}, expected {expected}");
+        }
+        assert!(!at.flags.any(), "{diagonal:?}");
+    }
+}

@@ -1,6 +1,7 @@
 //! The domain of a formula: where its logarithms, roots and powers have a value, and its primitives a limit.
 //!
-//! A branch of a selection counts only where it is taken.
+//! A branch of a selection counts only where it is taken. A condition has no domain: where it compares a number without
+//! a value, it fails.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -70,7 +71,7 @@ impl Uses {
         let mut masks: BTreeMap<NodeId, NodeId> = roots.iter().map(|&root| (root, always)).collect();
         // Operands have smaller numbers than their users.
         for node in operations(g, &roots).into_iter().rev() {
-            let used = masks[&node];
+            let Some(&used) = masks.get(&node) else { continue };
             let mut add = |g: &mut Graph, operand: NodeId, mask: NodeId| {
                 let known = masks.get(&operand).copied();
                 let mask = known.map_or(mask, |known| g.or(known, mask));
@@ -84,7 +85,7 @@ impl Uses {
                 (None, Op::Select(mask, yes, no)) => {
                     let opposite = g.not(mask);
                     let (if_yes, if_no) = (g.and(used, mask), g.and(used, opposite));
-                    [(mask, used), (yes, if_yes), (no, if_no)].into_iter().for_each(|(node, mask)| add(g, node, mask));
+                    [(yes, if_yes), (no, if_no)].into_iter().for_each(|(node, mask)| add(g, node, mask));
                 }
                 (None, op) => op.operands().for_each(|operand| add(g, operand, used)),
             }

@@ -137,7 +137,9 @@ impl Whole {
         let finite = ordinary.is_finite(g);
         let Hazards { flags, sound, .. } = ordinary.hazards;
         let unflagged = flags.into_iter().flatten().map(|flag| g.not(flag)).collect::<Vec<_>>();
-        let guards: Vec<NodeId> = moderate.into_iter().chain(sound).chain(unflagged).collect();
+        // Outside of the domain, results are no numbers: nothing else guards against them.
+        let always = outside.map(|_| g.truth(true));
+        let guards: Vec<NodeId> = moderate.into_iter().chain(sound).chain(unflagged).chain(always).collect();
         let Self { name, reduced, groups, .. } = ordinary;
         let Some(guards) = guards.into_iter().reduce(|all, guard| g.and(all, guard)) else {
             // A polynomial: it overflows where its own terms do.
