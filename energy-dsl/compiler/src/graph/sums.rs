@@ -12,6 +12,19 @@ impl Graph {
         }
     }
 
+    /// Creates Σ terms by halves: few additions wait for each other.
+    pub fn pairwise_sum(&mut self, terms: &[NodeId]) -> NodeId {
+        match terms {
+            [] => self.constant(0.0),
+            [term] => *term,
+            _ => {
+                let (first, last) = terms.split_at(terms.len() / 2);
+                let (first, last) = (self.pairwise_sum(first), self.pairwise_sum(last));
+                self.add(first, last)
+            }
+        }
+    }
+
     /// Creates sum + term for derivatives. A difference of two products may fuse here; in the formula itself it may
     /// not, because it must vanish for equal products (see `fuse.rs`).
     pub fn accumulate(&mut self, sum: NodeId, term: NodeId) -> NodeId {

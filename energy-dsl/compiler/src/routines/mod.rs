@@ -4,6 +4,7 @@ mod constraint;
 mod domain;
 mod hazards;
 mod magnitude;
+mod range;
 
 use crate::check::Program;
 use crate::diff::{Coordinates, Moving, Plan, SecondOrder, first_order, hessian_vector, only_dihedral, second_order};
@@ -11,6 +12,7 @@ use crate::graph::{Graph, Input, NodeId, Op, count, general, ordinary, with_sign
 use crate::lower::{Formula, Repetition, RestFormula};
 use energy_runtime::{Flag, Kind, OperationCount};
 use hazards::{Hazards, hazards, operations};
+use range::Tests;
 
 /// A routine to be generated.
 #[derive(Clone, Debug)]
@@ -117,11 +119,20 @@ impl Whole {
         Self { name: self.name, reduced, groups, hazards: Hazards { flags, sound, ..Hazards::default() } }
     }
 
-    /// Returns the mask where the sum of all results is finite. Before they are expanded to points, they are fewer.
-    fn is_finite(&self, g: &mut Graph) -> NodeId {
-        let (sum, infinity) = (g.sum(self.reduced.clone()), g.constant(f64::INFINITY));
+    /// Returns the mask where all results are finite, if the guards hold.
+    fn is_finite(&self, g: &mut Graph, guards: &[NodeId]) -> NodeId {
+        // Before results are expanded to points, they are fewer. The values come first.
+        let values = if self.name == "hessian_vector" { 0 } else { self.groups[0].len().min(self.reduced.len()) };
+        let (values, derivatives) = self.reduced.split_at(values);
+        let tests = Tests::of(g, guards, derivatives);
+        let all = [values, &tests.results].concat();
+        let (sum, infinity) = (g.pairwise_sum(&all), g.constant(f64::INFINITY));
         let size = g.abs(sum);
-        g.less(size, infinity)
+        let finite = g.less(size, infinity);
+        match tests.parameters(g) {
+            Some(moderate) => g.and(finite, moderate),
+            None => finite,
+        }
     }
 
     fn split(self, g: &mut Graph) -> Routine {
@@ -134,12 +145,12 @@ impl Whole {
         };
         let nodes = with_signs_inside(g, &nodes);
         let ordinary = self.with(g, &nodes);
-        let finite = ordinary.is_finite(g);
         let Hazards { flags, sound, .. } = ordinary.hazards;
         let unflagged = flags.into_iter().flatten().map(|flag| g.not(flag)).collect::<Vec<_>>();
         // Outside of the domain, results are no numbers: nothing else guards against them.
         let always = outside.map(|_| g.truth(true));
         let guards: Vec<NodeId> = moderate.into_iter().chain(sound).chain(unflagged).chain(always).collect();
+        let finite = ordinary.is_finite(g, &guards);
         let Self { name, reduced, groups, .. } = ordinary;
         let Some(guards) = guards.into_iter().reduce(|all, guard| g.and(all, guard)) else {
             // A polynomial: it overflows where its own terms do.

@@ -118,6 +118,9 @@ impl AnyElement {
 }
 
 /// A potential energy U(x).
+///
+/// Outside of the formula's domain, such as at the logarithm of a negative volume, U is +∞, its derivatives are 0, and
+/// [`Flags::degenerate`] is set. A line search that compares energies rejects such positions.
 pub trait Potential<T: Real>: Element {
     /// One vector per point: `[Vector3<T>; N]`.
     type Points: Array<Vector3<T>>;
