@@ -5,6 +5,7 @@ mod assembly;
 mod contacts;
 mod curvature;
 mod dissipation;
+mod domain;
 mod elements;
 mod export;
 mod hinges;

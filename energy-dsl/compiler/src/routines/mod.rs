@@ -119,20 +119,22 @@ impl Whole {
         Self { name: self.name, reduced, groups, hazards: Hazards { flags, sound, ..Hazards::default() } }
     }
 
-    /// Returns the mask where all results are finite, if the guards hold.
-    fn is_finite(&self, g: &mut Graph, guards: &[NodeId]) -> NodeId {
+    /// Returns the mask where all results are finite, if the guards hold. Adds a guard if that takes one.
+    fn is_finite(&self, g: &mut Graph, guards: &mut Vec<NodeId>) -> NodeId {
         // Before results are expanded to points, they are fewer. The values come first.
-        let values = if self.name == "hessian_vector" { 0 } else { self.groups[0].len().min(self.reduced.len()) };
+        let values = if self.has_values() { self.groups[0].len().min(self.reduced.len()) } else { 0 };
         let (values, derivatives) = self.reduced.split_at(values);
         let tests = Tests::of(g, guards, derivatives);
+        guards.extend(tests.parameters(g));
         let all = [values, &tests.results].concat();
         let (sum, infinity) = (g.pairwise_sum(&all), g.constant(f64::INFINITY));
         let size = g.abs(sum);
-        let finite = g.less(size, infinity);
-        match tests.parameters(g) {
-            Some(moderate) => g.and(finite, moderate),
-            None => finite,
-        }
+        g.less(size, infinity)
+    }
+
+    /// Returns whether the first group is of values, not of derivatives.
+    fn has_values(&self) -> bool {
+        self.name != "hessian_vector"
     }
 
     fn split(self, g: &mut Graph) -> Routine {
@@ -149,8 +151,8 @@ impl Whole {
         let unflagged = flags.into_iter().flatten().map(|flag| g.not(flag)).collect::<Vec<_>>();
         // Outside of the domain, results are no numbers: nothing else guards against them.
         let always = outside.map(|_| g.truth(true));
-        let guards: Vec<NodeId> = moderate.into_iter().chain(sound).chain(unflagged).chain(always).collect();
-        let finite = ordinary.is_finite(g, &guards);
+        let mut guards: Vec<NodeId> = moderate.into_iter().chain(sound).chain(unflagged).chain(always).collect();
+        let finite = ordinary.is_finite(g, &mut guards);
         let Self { name, reduced, groups, .. } = ordinary;
         let Some(guards) = guards.into_iter().reduce(|all, guard| g.and(all, guard)) else {
             // A polynomial: it overflows where its own terms do.
