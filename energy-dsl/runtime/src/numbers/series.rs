@@ -33,6 +33,8 @@ pub(super) fn with_length<R>(length: usize, evaluate: impl FnOnce() -> R) -> (R,
 const CANCELLED: f64 = 1e-12;
 /// Powers that differ by less are equal.
 const SAME: f64 = 1e-9;
+/// Terms further apart than this many whole powers are sorted.
+const MOST_STEPS: f64 = 64.0;
 /// The power of what grows or vanishes faster than every power, such as e^(1/ε).
 const BEYOND: f64 = 1e6;
 
@@ -156,27 +158,27 @@ impl Series {
     }
 
     /// Adds terms of one order, and drops those that are zero or unknown.
-    fn sorted(terms: Vec<Term>, mut unknown: Order) -> Self {
+    fn sorted(mut terms: Vec<Term>, mut unknown: Order) -> Self {
         if !terms.iter().all(|term| term.factor.is_finite()) {
             return Self::undefined();
         }
-        let mut kept: Vec<Term> = Vec::with_capacity(terms.len());
-        let mut first = 0;
+        let (mut first, mut kept, length) = (0, 0, LENGTH.get());
         while first < terms.len() {
             let order = terms[first].order;
             let same = terms[first..].iter().take_while(|term| term.order.compare(order) == Ordering::Equal).count();
-            let group = &terms[first..first + same];
+            let sum = sum_of(&terms[first..first + same]);
             first += same;
-            if let Some(sum) = sum_of(group).filter(|_| order.is_larger_than(unknown)) {
-                kept.push(sum);
+            if let Some(sum) = sum.filter(|_| order.is_larger_than(unknown)) {
+                if kept == length {
+                    unknown = unknown.larger(order);
+                    break;
+                }
+                terms[kept] = sum;
+                kept += 1;
             }
         }
-        let length = LENGTH.get();
-        if let Some(dropped) = kept.get(length) {
-            unknown = unknown.larger(dropped.order);
-            kept.truncate(length);
-        }
-        Self { terms: kept, unknown }
+        terms.truncate(kept);
+        Self { terms, unknown }
     }
 
     /// Notes that terms are missing, unless the series is undefined or 0.
@@ -233,7 +235,34 @@ impl Series {
             factor: a.factor * b.factor,
             doubt: a.doubt.max(b.doubt),
         };
-        Self::of(self.terms.iter().flat_map(|a| other.terms.iter().map(move |b| product(a, b))).collect(), unknown)
+        let Some((own, others)) = self.steps().zip(other.steps()) else {
+            let products = self.terms.iter().flat_map(|a| other.terms.iter().map(move |b| product(a, b)));
+            return Self::of(products.collect(), unknown);
+        };
+        // Powers of both ascend in whole steps, so that products need not be sorted.
+        let last = own[self.terms.len().max(1) - 1] + others[other.terms.len().max(1) - 1];
+        let mut terms = Vec::with_capacity(LENGTHS[1] * LENGTHS[0]);
+        for step in 0..=last {
+            for (a, &at) in self.terms.iter().zip(&own) {
+                let partner = others[..other.terms.len()].iter().position(|&other| at + other == step);
+                terms.extend(partner.map(|partner| product(a, &other.terms[partner])));
+            }
+        }
+        Self::sorted(terms, unknown)
+    }
+
+    /// Returns the whole steps between the power of each term and that of the first; `None` if there are other powers,
+    /// or logarithms.
+    fn steps(&self) -> Option<[usize; LENGTHS[1]]> {
+        let (mut steps, first) = ([0; LENGTHS[1]], self.leading().power);
+        for (step, term) in steps.iter_mut().zip(&self.terms) {
+            let distance = term.order.power - first;
+            if term.order.logs != 0.0 || distance != distance.round() || distance > MOST_STEPS {
+                return None;
+            }
+            *step = distance as usize;
+        }
+        Some(steps)
     }
 
     pub(super) fn scaled(&self, by: f64) -> Self {
