@@ -4,8 +4,6 @@ mod accuracy;
 mod auditor;
 mod continuity;
 mod entry;
-mod html;
-mod input;
 mod junit;
 mod laws;
 mod momentum;
@@ -15,17 +13,14 @@ mod report;
 mod routes;
 mod subject;
 
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::num::NonZero;
 
 use energy_dsl::{AnyElement, Declaration, Element};
 
 pub use self::accuracy::amplification;
 use self::auditor::{Auditor, Case, case, cases};
 use self::continuity::typical_value;
-pub use self::html::html;
-pub use self::input::read_inputs;
-pub use self::junit::junit;
+pub use self::junit::{escaped, junit};
 pub use self::report::{
     Accuracy, Check, Line, Mutant, MutationScore, Report, Section, Spot, StepCurve, describe_failure,
 };
@@ -33,6 +28,7 @@ pub use self::subject::{EvaluateAny, Subject, Target};
 use crate::blocks::{BlockName, Evaluate, NoAnswer};
 use crate::geometry::{Rotation, longest_distance, shortest_distance};
 use crate::multiprecision::TrueBlock;
+use crate::parallel;
 use crate::sample::{Sample, has_points};
 
 /// Thoroughness of an audit.
@@ -50,11 +46,13 @@ pub struct Options {
     pub trials: usize,
     /// Seed of the random inputs.
     pub seed: u64,
+    /// Number of threads; `None` uses all processors. Reports do not depend on it.
+    pub threads: Option<NonZero<usize>>,
 }
 
 impl Default for Options {
     fn default() -> Self {
-        Self { samples: 200, declared_samples: false, truths: 24, mutations: 24, trials: 40, seed: 1 }
+        Self { samples: 200, declared_samples: false, truths: 24, mutations: 24, trials: 40, seed: 1, threads: None }
     }
 }
 
@@ -80,30 +78,12 @@ pub fn targets_in(catalogue: &'static [AnyElement], names: &[&str]) -> Result<Ve
     Ok(chosen.map(Target::of_element).collect())
 }
 
-/// Audits all targets on all processors; the report is in their order. If an energy is given, the targets are forces
-/// that must be minus its gradient, at the same points and with its parameters by name.
+/// Audits all targets; the report is in their order, for any number of threads. If an energy is given, the targets are
+/// forces that must be minus its gradient, at the same points and with its parameters by name.
 #[must_use]
 pub fn audit_all(targets: &[Target], energy: Option<&Target>, options: Options) -> Report {
-    let next = AtomicUsize::new(0);
-    let reports: Mutex<Vec<Option<Report>>> = Mutex::new(targets.iter().map(|_| None).collect());
-    let workers = std::thread::available_parallelism().map_or(1, usize::from).min(targets.len());
-    std::thread::scope(|scope| {
-        for _ in 0..workers {
-            scope.spawn(|| {
-                while let Some((number, target)) = {
-                    let number = next.fetch_add(1, Ordering::Relaxed);
-                    targets.get(number).map(|target| (number, target))
-                } {
-                    let report = audit_target(target, energy, options);
-                    if let Ok(mut reports) = reports.lock() {
-                        reports[number] = Some(report);
-                    }
-                }
-            });
-        }
-    });
     let mut all = Report::default();
-    for report in reports.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner).into_iter().flatten() {
+    for report in parallel::map(targets, options.threads, Target::cost, |t| audit_target(t, energy, options)) {
         all.extend(report);
     }
     all

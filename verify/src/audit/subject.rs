@@ -56,6 +56,12 @@ impl Target {
         self.declaration().name
     }
 
+    /// Returns the operations of all routines, which the time of an audit grows with.
+    #[must_use]
+    pub fn cost(&self) -> usize {
+        self.declaration().routines.iter().map(|routine| routine.full.total()).sum()
+    }
+
     fn declaration(&self) -> &'static Declaration {
         match &self.0 {
             Origin::Catalogue(entry) => entry.declaration,

@@ -6,12 +6,15 @@ mod sweeps;
 pub use report::{markdown, plots};
 pub use sweeps::{Sweep, sweeps};
 
+use std::num::NonZero;
+
 use serde::Serialize;
 
 use verify::audit::{Subject, Target, amplification};
 use verify::blocks::BlockName;
 use verify::formula::expected_blocks;
 use verify::multiprecision::truth;
+use verify::parallel;
 use verify::sample::Sample;
 
 /// Errors of one block at one point of a sweep, in units of roundoff of its largest number.
@@ -63,6 +66,16 @@ impl Track {
     pub fn passed(&self) -> bool {
         self.points.iter().all(Point::passed)
     }
+}
+
+/// Runs every sweep that fits each element. `None` uses all processors; the result does not depend on the number of
+/// threads.
+///
+/// # Errors
+/// If an element cannot be read.
+pub fn stress_all(targets: &[Target], threads: Option<NonZero<usize>>) -> Result<Vec<Track>, String> {
+    let tracks: Result<Vec<_>, _> = parallel::map(targets, threads, Target::cost, stress).into_iter().collect();
+    tracks.map(|tracks| tracks.concat())
 }
 
 /// Runs every sweep that fits an element.
