@@ -85,6 +85,9 @@ fn element(page: &mut String, report: &Report, section: &Section) {
     for line in report.failures().filter(|line| line.element == section.element) {
         let _ = writeln!(page, "<pre class=\"failed\">{}</pre>", escaped(&describe_failure(line)));
     }
+    for warning in &section.warnings {
+        let _ = writeln!(page, "<pre>warning: {}</pre>", escaped(&warning.describe(section.element)));
+    }
     accuracy(page, section);
     checks(page, report, section);
     plots(page, section);

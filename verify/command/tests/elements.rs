@@ -6,12 +6,13 @@ use verify::audit::{Options, audit, describe_failure};
 use verify::parallel;
 
 /// The comparisons that `assert_derivatives!` makes for an element.
-const OPTIONS: Options =
-    Options { samples: 200, declared_samples: false, truths: 5, mutations: 0, trials: 40, seed: 1, threads: None };
+fn options() -> Options {
+    Options { truths: 5, mutations: 0, extremes: 10, ..Options::default() }
+}
 
 /// Returns a description of each failed check of an element's generated code.
 fn problems(entry: &AnyElement) -> Vec<String> {
-    let report = audit(entry.declaration, entry.evaluate, OPTIONS);
+    let report = audit(entry.declaration, entry.evaluate, options());
     let refused = report.refused.iter().map(|(name, why)| format!("{name} cannot be audited: {why}"));
     let problems: Vec<String> = refused.chain(report.failures().map(describe_failure)).collect();
     assert!(!problems.is_empty() || !report.lines.is_empty(), "{}: no checks", entry.declaration.name);

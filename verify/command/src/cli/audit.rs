@@ -9,7 +9,8 @@ use super::output::{table, write_json, write_text};
 use super::targets::{energy_target, targets};
 
 /// Compares every derivative with multi-precision, dual numbers and finite differences, checks the laws that it must
-/// obey, and plants faults that must be noticed. Exit status 1 on any failure.
+/// obey, and plants faults that must be noticed. Looks near rest and near singularities, and warns where digits are
+/// lost. Exit status 1 on any failure, 0 with warnings.
 #[derive(Args)]
 pub struct Audit {
     /// Elements of the catalogue or of the file [default: all].
@@ -123,16 +124,20 @@ fn print(report: &Report) {
     for (name, why) in &report.refused {
         println!("\n{name} cannot be audited: {why}");
     }
+    for (element, warning) in report.warnings() {
+        println!("\nwarning: {}", warning.describe(element));
+    }
     for (element, mutant) in report.missed() {
         println!("\n{element}: no check noticed a planted fault: {}", mutant.fault);
     }
     print_mutation_scores(report);
     println!("\n{}", report.blind_spots().join("\n"));
     println!(
-        "\n{} elements, {} checks, {} failed",
+        "\n{} elements, {} checks, {} failed, {} warnings",
         report.elements(),
         report.lines.len(),
-        report.failures().count() + report.refused.len() + report.missed().count()
+        report.failures().count() + report.refused.len() + report.missed().count(),
+        report.warnings().count()
     );
 }
 
