@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use crate::geometry::{Rotation, difference, is_well_shaped, rotate, shortest_distance};
 
 /// One input of an element, flattened in declared order.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Sample {
     /// Parameters, followed by a constraint's stiffness and damping.

@@ -44,6 +44,15 @@ impl TrueBlock {
         }
     }
 
+    /// Returns the largest difference from another block in multi-precision, relative to the largest number; 0 for equal
+    /// blocks.
+    #[must_use]
+    pub fn relative_difference(&self, other: &Self) -> f64 {
+        let pairs = self.block.numbers.iter().zip(&other.block.numbers);
+        let difference = pairs.map(|(a, b)| (a.clone() - b.clone()).to_f64().abs()).fold(0.0, worse);
+        if difference == 0.0 { 0.0 } else { difference / self.largest() }
+    }
+
     /// Returns the index of the largest error.
     #[must_use]
     pub fn worst_entry(&self, got: &[f64]) -> usize {

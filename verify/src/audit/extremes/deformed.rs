@@ -121,3 +121,53 @@ fn each(dimension: usize, place: impl Fn([f64; 3], bool) -> Sample) -> Vec<Extre
     let first = list.iter().enumerate().map(|item| placed(item, false));
     first.chain(list.iter().enumerate().take(BOTH_WAYS).map(|item| placed(item, true))).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Returns the edges from the first point.
+    fn edges(sample: &Sample) -> Vec<[f64; 3]> {
+        let x = &sample.positions;
+        (1..x.len() / 3).map(|point| std::array::from_fn(|axis| x[3 * point + axis] - x[axis])).collect()
+    }
+
+    fn dot(a: &[f64; 3], b: &[f64; 3]) -> f64 {
+        (0..3).map(|axis| a[axis] * b[axis]).sum()
+    }
+
+    /// Turned or not, the edges are orthogonal, and their lengths are the stretches.
+    #[test]
+    fn points_have_the_stretches_that_their_places_name() {
+        for count in [3, 4] {
+            let ordinary = Sample { positions: vec![0.5; 3 * count], ..Sample::default() };
+            let list = of_edges(&ordinary);
+            assert!(list.len() >= if count == 3 { 9 } else { 16 });
+            for Extreme { place, sample } in &list {
+                let stretches = place.split("stretches ").nth(1).unwrap().split(", ");
+                let edges = edges(sample);
+                for (edge, stretch) in edges.iter().zip(stretches) {
+                    let stretch: f64 = stretch.parse().unwrap();
+                    assert!((dot(edge, edge).sqrt() - stretch.abs()).abs() < 1e-15, "{place}: {edges:?}");
+                }
+                assert!(dot(&edges[0], &edges[1]).abs() < 1e-15, "{place}: {edges:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn every_kind_of_place_is_among_the_first() {
+        let ordinary = Sample { positions: vec![0.5; 12], ..Sample::default() };
+        let list = of_edges(&ordinary);
+        let first: Vec<&str> = list[..8].iter().map(Extreme::kind).collect();
+        for kind in [
+            "at a needle",
+            "near a mirror image",
+            "where two stretches are nearly equal",
+            "where two stretches are equal",
+            "where three stretches are equal",
+        ] {
+            assert!(first.contains(&kind), "{kind} is not in {first:?}");
+        }
+    }
+}
