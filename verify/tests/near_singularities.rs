@@ -15,7 +15,9 @@ fn tetrahedron(formula: &str) -> String {
 }
 
 fn triangle(formula: &str) -> String {
-    format!("energy Tri(x0, x1, x2: Point; rest u0, u1, u2: Vec2; μ: Scalar) {{ {REST_OF_TRIANGLE} A * μ * ({formula}) }}")
+    format!(
+        "energy Tri(x0, x1, x2: Point; rest u0, u1, u2: Vec2; μ: Scalar) {{ {REST_OF_TRIANGLE} A * μ * ({formula}) }}"
+    )
 }
 
 fn options() -> Options {
@@ -61,7 +63,8 @@ fn an_energy_of_the_strain_has_no_warning() {
 
 #[test]
 fn a_rest_length_is_found_among_the_parameters() {
-    let text = "energy Spring(p, q: Point; k, L: Scalar) { k * (norm_squared(p - q) / L^2 + L^2 / norm_squared(p - q) - 2) }";
+    let text =
+        "energy Spring(p, q: Point; k, L: Scalar) { k * (norm_squared(p - q) / L^2 + L^2 / norm_squared(p - q) - 2) }";
     let report = report(text);
     let near = warnings(&report, "from its rest value");
     assert!(near.iter().any(|warning| warning.place.contains("`L`")), "{:?}", report.warnings().collect::<Vec<_>>());

@@ -61,7 +61,9 @@ fn errors(parts: &Parts, sample: &Sample, (order, block_order): (Order, usize)) 
     at_precision(BITS, || {
         let exact = parts.evaluate(&JetInputs::<Big>::new(sample, None, order).inputs());
         let pairs = exact.iter().zip(&doubles);
-        pairs.map(|(exact, found)| (0..=block_order).map(|k| relative_error(exact, found, k)).fold(0.0, worse)).collect()
+        pairs
+            .map(|(exact, found)| (0..=block_order).map(|k| relative_error(exact, found, k)).fold(0.0, worse))
+            .collect()
     })
 }
 

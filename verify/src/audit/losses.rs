@@ -9,7 +9,7 @@ use super::entry::entry_name;
 use super::extremes::Extreme;
 use super::report::{Check, Warning};
 use crate::blocks::{Answer, Block, largest};
-use crate::multiprecision::{Truth, TrueBlock, truth_of_extreme, worse};
+use crate::multiprecision::{TrueBlock, Truth, truth_of_extreme, worse};
 use crate::sample::Sample;
 
 /// The error that is not worth a warning, in units of roundoff times max(1, κ).
@@ -106,7 +106,8 @@ impl Auditor<'_> {
             }
             if is_flagged || !exact.is_defined {
                 let limits = limits.get_or_insert_with(|| self.limits(&extreme));
-                let Some(error) = limits[number].as_ref().map(|limit| self.loss(&extreme, &answer, block, limit)) else {
+                let Some(error) = limits[number].as_ref().map(|limit| self.loss(&extreme, &answer, block, limit))
+                else {
                     continue;
                 };
                 if error > BESIDE_A_LIMIT {

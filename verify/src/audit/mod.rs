@@ -27,8 +27,8 @@ use self::auditor::Auditor;
 use self::budget::Meter;
 use self::cases::{Case, Cases, cases};
 use self::continuity::typical_value;
-use self::losses::Losses;
 pub use self::junit::{escaped, junit};
+use self::losses::Losses;
 pub use self::report::{
     Accuracy, Check, Line, Mutant, MutationScore, Report, Section, Spot, StepCurve, Warning, describe_failure,
 };
@@ -160,12 +160,13 @@ pub fn audit(declaration: &'static Declaration, evaluate: Evaluate, options: Opt
 fn run(subject: &Subject, energy: Option<&Subject>, options: Options) -> Result<Report, String> {
     let declared = subject.declared_samples().filter(|_| options.declared_samples);
     let samples = declared.unwrap_or(options.samples);
-    let Cases { list: cases, outside, outside_inputs, missing } =
-        cases(subject, samples, options.truths, options.seed);
+    let Cases { list: cases, outside, outside_inputs, missing } = cases(subject, samples, options.truths, options.seed);
     if cases.is_empty() && samples > 0 {
-        return Err("the formula has no value at any input tried; state where it has one, as in #[audit(domain(strain = \
+        return Err(
+            "the formula has no value at any input tried; state where it has one, as in #[audit(domain(strain = \
                     0.5..2.0))]"
-            .into());
+                .into(),
+        );
     }
     let mut auditor = Auditor::new(subject);
     let mut section = Section { outside, ..section(subject, cases.len()) };

@@ -83,7 +83,12 @@ fn subject(interpreted: &Interpreted, meter: &Meter) -> Result<Subject, String> 
 /// For a block, that is twice the allowed error of accuracy, 8 u·max(1, κ), because rounding may hide as much. For a
 /// block that another routine repeats, it is the allowed difference between routines. The last coefficient of a series
 /// changes only last bits. An operation that no input reaches, or whose other operand is always 1, changes nothing.
-fn largest_difference(subject: &Subject, sound: &Interpreted, broken: &Interpreted, trials: &[Trial<'_>]) -> Option<f64> {
+fn largest_difference(
+    subject: &Subject,
+    sound: &Interpreted,
+    broken: &Interpreted,
+    trials: &[Trial<'_>],
+) -> Option<f64> {
     let mut most = 0.0_f64;
     for Trial { case, .. } in trials {
         subject.meter.exact_routines();

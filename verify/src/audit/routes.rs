@@ -60,7 +60,13 @@ impl Auditor<'_> {
         Ok(found.map(|found| (lower, found)))
     }
 
-    fn compare_all(&mut self, case: &Case<'_>, answer: &Answer, block: &Block, differences: Option<&(BlockName, Sweep)>) {
+    fn compare_all(
+        &mut self,
+        case: &Case<'_>,
+        answer: &Answer,
+        block: &Block,
+        differences: Option<&(BlockName, Sweep)>,
+    ) {
         let digits: Option<Vec<f64>> = case
             .truth(block.name)
             .filter(|t| t.is_defined)

@@ -21,6 +21,6 @@ use dashu::Float;
 #[cfg(feature = "rug")]
 use rug::Float;
 
-pub(crate) use truth::{Truth, truth_of_extreme, truth_of_ordinary};
 pub use truth::worse;
 pub use truth::{TrueBlock, truth};
+pub(crate) use truth::{Truth, truth_of_extreme, truth_of_ordinary};

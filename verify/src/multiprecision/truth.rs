@@ -135,12 +135,7 @@ enum Zeros {
     Confirmed,
 }
 
-fn at_rising_precision(
-    digits: usize,
-    zeros: Zeros,
-    highest: usize,
-    blocks: impl Fn() -> Vec<Block<Big>>,
-) -> Truth {
+fn at_rising_precision(digits: usize, zeros: Zeros, highest: usize, blocks: impl Fn() -> Vec<Block<Big>>) -> Truth {
     // log₂ 10, and some bits for ordinary cancellation.
     let wanted = digits * 333 / 100 + 1;
     let at = |bits: usize| with_precision(bits, &blocks);
@@ -167,13 +162,7 @@ fn at_rising_precision(
 }
 
 /// Returns the block if two precisions agree on it, or if the finer precision is the highest.
-fn agreed(
-    coarse: &Block<Big>,
-    fine: &Block<Big>,
-    wanted: usize,
-    zeros: Zeros,
-    is_highest: bool,
-) -> Option<TrueBlock> {
+fn agreed(coarse: &Block<Big>, fine: &Block<Big>, wanted: usize, zeros: Zeros, is_highest: bool) -> Option<TrueBlock> {
     let wanted = -i64::try_from(wanted).unwrap_or(i64::MAX);
     let is_defined = fine.numbers.iter().all(Big::is_defined);
     let scale = largest(&fine.numbers);

@@ -1,4 +1,5 @@
-//! The methods of computing an element's Hessian. All but multi-precision run the same generated code.
+//! The methods of computing an element's Hessian. Each is in its best form: differences at their best step, num-dual on
+//! the plain formula with all derivatives at once. The others run the same generated code.
 
 use std::cell::RefCell;
 use std::hint::black_box;
@@ -13,7 +14,6 @@ use energy_dsl::{
 use serde::Serialize;
 
 use super::complex::Complex;
-use super::dual2::Dual2;
 use verify::audit::Subject;
 use verify::blocks::BlockName;
 use verify::formula::expected_blocks;
@@ -57,23 +57,21 @@ impl<'a> Methods<'a> {
     }
 
     /// Measures every method, from the least to the most exact.
-    pub(super) fn all<D, S, C, H, const N: usize>(
+    pub(super) fn all<D, S, C>(
         &self,
         double: Make<'_, D>,
         single: Make<'_, S>,
         complex: Make<'_, C>,
-        dual: Make<'_, H>,
+        dual: &dyn Fn(&Sample) -> Vec<f64>,
     ) -> Vec<Measured>
     where
         D: PackedPotential<f64>,
         S: Potential<f32>,
         C: Potential<Complex>,
-        H: Potential<Dual2<N>>,
     {
         let doubles: Vec<(D, D::Points)> = self.samples.iter().map(|s| (double(s), points(s))).collect();
         let singles: Vec<(S, S::Points)> = self.samples.iter().map(|s| (single(s), points(s))).collect();
         let complexes: Vec<(C, C::Points)> = self.samples.iter().map(|s| (complex(s), points(s))).collect();
-        let duals: Vec<(H, H::Points)> = self.samples.iter().map(|s| (dual(s), points(s))).collect();
         let sizes: Vec<f64> = self.samples.iter().map(|s| longest_distance(&s.positions).unwrap_or(1.0)).collect();
         let differences = |method, stencil: &[(f64, f64)]| {
             self.at_best_step(method, |i, step| by_differences(&doubles[i], stencil, step * sizes[i]))
@@ -86,7 +84,7 @@ impl<'a> Methods<'a> {
                 &[(-2.0, 1.0 / 12.0), (-1.0, -2.0 / 3.0), (1.0, 2.0 / 3.0), (2.0, -1.0 / 12.0)],
             ),
             self.measure("complex step", |i| by_complex_step(&complexes[i])),
-            self.measure("num-dual", |i| by_dual_numbers(&duals[i])),
+            self.measure("num-dual", |i| dual(&self.samples[i])),
         ];
         let timed = self.time(|i| discard(singles[i].0.hessian(black_box(&singles[i].1)).hessian));
         let error = self.error(|i| full(singles[i].0.hessian(&singles[i].1).hessian.as_ref(), f64::from));
@@ -262,15 +260,6 @@ fn by_complex_step<E: Potential<Complex>>((element, x): &(E, E::Points)) -> Vec<
         }
     }
     matrix
-}
-
-/// Evaluates one value over numbers that carry all derivatives.
-fn by_dual_numbers<E: Potential<Dual2<N>>, const N: usize>((element, x): &(E, E::Points)) -> Vec<f64> {
-    let mut moved = *x;
-    for (coordinate, number) in moved.as_mut().as_flattened_mut().iter_mut().enumerate() {
-        *number = Dual2::variable(number.0.re, coordinate);
-    }
-    element.value(&moved).value.hessian()
 }
 
 /// Computes batches of Hessians and discards them.

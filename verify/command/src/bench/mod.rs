@@ -2,9 +2,9 @@
 //! multi-precision with 30 digits are compared with 60 digits.
 
 mod complex;
-mod dual2;
 mod elements;
 mod methods;
+mod plain;
 
 use std::fmt::Write as _;
 

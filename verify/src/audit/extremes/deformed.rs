@@ -57,7 +57,13 @@ pub(super) fn of_edges(ordinary: &Sample) -> Vec<Extreme> {
     let place = |stretches: [f64; 3], turned: bool| {
         let edge = |number: usize, axis: usize| match turned {
             true => TURN[axis][number] * stretches[number],
-            false => if axis == number { stretches[number] } else { 0.0 },
+            false => {
+                if axis == number {
+                    stretches[number]
+                } else {
+                    0.0
+                }
+            }
         };
         let edges = (0..dimension).flat_map(|number| (0..3).map(move |axis| (number, axis)));
         let points = edges.map(|(number, axis)| origin[axis] + edge(number, axis));
@@ -76,7 +82,8 @@ pub(super) fn of_matrices(declaration: &Declaration, ordinary: &Sample) -> Vec<E
             if field.size == dimension * dimension {
                 for row in 0..dimension {
                     for column in 0..dimension {
-                        let turn = if dimension == 3 { TURN[row][column] } else { [[0.6, 0.8], [-0.8, 0.6]][row][column] };
+                        let turn =
+                            if dimension == 3 { TURN[row][column] } else { [[0.6, 0.8], [-0.8, 0.6]][row][column] };
                         let along = if row == column { 1.0 } else { 0.0 };
                         let entry = if turned { turn } else { along };
                         numbers[first + dimension * row + column] = entry * stretches[column];

@@ -68,7 +68,8 @@ pub(super) fn near_parameter(subject: &Subject, ordinary: &Sample) -> Vec<Extrem
         })
         .collect();
     let exact = Sample { positions: ordinary.positions.iter().map(|&x| dyadic(x)).collect(), ..ordinary.clone() };
-    let found = scalars.into_iter().find_map(|(number, name)| Some((number, name, rest_value(subject, &exact, number)?)));
+    let found =
+        scalars.into_iter().find_map(|(number, name)| Some((number, name, rest_value(subject, &exact, number)?)));
     let Some((number, name, value)) = found else { return Vec::new() };
     let strained = |&exponent: &i32| {
         let strain = f64::from(exponent).exp2();
