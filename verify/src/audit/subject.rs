@@ -65,7 +65,9 @@ impl Target {
         self.declaration().routines.iter().map(|routine| routine.full.total()).sum()
     }
 
-    fn declaration(&self) -> &'static Declaration {
+    /// Returns the declaration of the element.
+    #[must_use]
+    pub fn declaration(&self) -> &'static Declaration {
         match &self.0 {
             Origin::Catalogue(entry) => entry.declaration,
             Origin::Text(element) => element.declaration(),
@@ -86,6 +88,17 @@ impl Target {
                 Subject::new(declaration, Box::new(entry.evaluate), interpreted)
             }
             Origin::Text(element) => Subject::of_routines(element, Some(element.as_ref().clone())),
+        }
+    }
+
+    /// Returns the element without the compiled routines that faults are planted in. This takes little time.
+    ///
+    /// # Errors
+    /// If the declaration does not compile.
+    pub fn subject_without_faults(&self) -> Result<Subject, String> {
+        match &self.0 {
+            Origin::Catalogue(entry) => Subject::new(entry.declaration, Box::new(entry.evaluate), None),
+            Origin::Text(element) => Subject::of_routines(element, None),
         }
     }
 }

@@ -303,7 +303,7 @@ impl<E: PackedPotential<f64>> Lanes<E> {
         let done = self.packed.hessians(0..MANY, &self.positions, &mut energies, &mut gradients, numbers);
         done.expect("the slices fit the range");
         let of = |number: usize| &triangles[number * blocks..(number + 1) * blocks];
-        let last = (element..MANY).step_by(self.different).last().unwrap_or(element);
+        let last = (element..MANY).step_by(self.different).next_back().unwrap_or(element);
         of(last).to_vec()
     }
 }

@@ -3,7 +3,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use verify_command::reference::policy;
-use verify_command::stress::{markdown, plots, stress_all};
+use verify_command::stress::{markdown, plots, stress};
 
 use super::output::{create_folder, records, write_json, write_text};
 use super::policy as documented;
@@ -30,7 +30,7 @@ pub struct Stress {
 impl Stress {
     pub fn run(self) -> anyhow::Result<bool> {
         let targets = targets(&self.names, self.file.as_deref())?;
-        let tracks = stress_all(&targets, self.threads).map_err(anyhow::Error::msg)?;
+        let tracks = stress(&targets, self.threads).map_err(anyhow::Error::msg)?;
         let table = markdown(&tracks);
         print!("{table}");
         if let Some(folder) = self.output {
