@@ -151,7 +151,7 @@ mod tests {
             let list = of_edges(&ordinary);
             assert!(list.len() >= if count == 3 { 9 } else { 16 });
             for Extreme { place, sample } in &list {
-                let stretches = place.split("stretches ").nth(1).unwrap().split(", ");
+                let stretches = place.split(", of stretches ").nth(1).unwrap().split(", ");
                 let edges = edges(sample);
                 for (edge, stretch) in edges.iter().zip(stretches) {
                     let stretch: f64 = stretch.parse().unwrap();
