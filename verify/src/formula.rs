@@ -37,11 +37,21 @@ pub fn blocks_over<T: Number<Mask = bool>>(
     formula: &Textbook,
     sample: &Sample,
 ) -> Vec<Block<T>> {
-    blocks(declaration.kind, expand_by_jets(formula, sample, order(declaration.kind)), sample)
+    blocks(declaration.kind, expand_by_jets(formula, sample, None, order(declaration.kind)), sample)
+}
+
+/// Computes every block at the sum of an input and a small offset, which doubles need not represent.
+pub(crate) fn blocks_near<T: Number<Mask = bool>>(
+    declaration: &Declaration,
+    formula: &Textbook,
+    sample: &Sample,
+    offset: &Sample,
+) -> Vec<Block<T>> {
+    blocks(declaration.kind, expand_by_jets(formula, sample, Some(offset), order(declaration.kind)), sample)
 }
 
 /// Returns the order of differentiation that the blocks of a kind need.
-fn order(kind: Kind) -> Order {
+pub(crate) fn order(kind: Kind) -> Order {
     match kind {
         Kind::Energy | Kind::Constraint => Order::Second,
         Kind::Force | Kind::Residual => Order::First,
@@ -113,20 +123,59 @@ fn sum<T: Number>(count: usize, term: impl Fn(usize) -> T) -> T {
     (0..count).fold(T::from_f64(0.0), |sum, i| sum + term(i))
 }
 
+/// Inputs with their derivatives.
+pub(crate) struct JetInputs<T> {
+    parameters: Vec<Jet<T>>,
+    rest: Vec<Jet<T>>,
+    positions: Vec<Jet<T>>,
+    velocities: Vec<Jet<T>>,
+}
+
+impl<T: Number<Mask = bool>> JetInputs<T> {
+    /// Creates inputs with all coordinates variable: first positions, then velocities unless second derivatives are
+    /// wanted. The numbers are those of the sample plus the offset.
+    pub(crate) fn new(sample: &Sample, offset: Option<&Sample>, order: Order) -> Self {
+        let (n, m) = (sample.positions.len(), if order == Order::First { sample.velocities.len() } else { 0 });
+        let numbers = |pick: fn(&Sample) -> &[f64]| -> Vec<T> {
+            let plain = pick(sample).iter().map(|&x| T::from_f64(x));
+            match offset {
+                Some(offset) => plain.zip(pick(offset)).map(|(x, &dx)| x + T::from_f64(dx)).collect(),
+                None => plain.collect(),
+            }
+        };
+        let constants = |numbers: Vec<T>| numbers.into_iter().map(Jet::constant).collect::<Vec<_>>();
+        let moving = |numbers: Vec<T>, first: usize| -> Vec<Jet<T>> {
+            let variable = |(i, x): (usize, T)| Jet::variable(x, first + i, n + m, order);
+            numbers.into_iter().enumerate().map(variable).collect()
+        };
+        let velocities = numbers(|sample| &sample.velocities);
+        Self {
+            parameters: constants(numbers(|sample| &sample.parameters)),
+            rest: constants(numbers(|sample| &sample.rest)),
+            positions: moving(numbers(|sample| &sample.positions), 0),
+            velocities: if m > 0 { moving(velocities, n) } else { constants(velocities) },
+        }
+    }
+
+    pub(crate) fn inputs(&self) -> Inputs<'_, Jet<T>> {
+        Inputs {
+            parameters: &self.parameters,
+            rest: &self.rest,
+            positions: &self.positions,
+            velocities: &self.velocities,
+        }
+    }
+}
+
 /// Evaluates once with all coordinates variable: first positions, then velocities.
-fn expand_by_jets<T: Number<Mask = bool>>(formula: &Textbook, sample: &Sample, order: Order) -> Expansion<T> {
+fn expand_by_jets<T: Number<Mask = bool>>(
+    formula: &Textbook,
+    sample: &Sample,
+    offset: Option<&Sample>,
+    order: Order,
+) -> Expansion<T> {
     let (n, m) = (sample.positions.len(), if order == Order::First { sample.velocities.len() } else { 0 });
-    let constants = |numbers: &[f64]| numbers.iter().map(|&x| Jet::constant(T::from_f64(x))).collect::<Vec<_>>();
-    let moving = |numbers: &[f64], first: usize| -> Vec<Jet<T>> {
-        let variable = |(i, &x): (usize, &f64)| Jet::variable(T::from_f64(x), first + i, n + m, order);
-        numbers.iter().enumerate().map(variable).collect()
-    };
-    let rows = formula.evaluate(&Inputs {
-        parameters: &constants(&sample.parameters),
-        rest: &constants(&sample.rest),
-        positions: &moving(&sample.positions, 0),
-        velocities: &if m > 0 { moving(&sample.velocities, n) } else { constants(&sample.velocities) },
-    });
+    let rows = formula.evaluate(&JetInputs::new(sample, offset, order).inputs());
     let row = |row: &Jet<T>, range: std::ops::Range<usize>| range.map(|i| row.by(i)).collect::<Vec<T>>();
     let twice = |row: &Jet<T>| (0..n).map(|i| (0..n).map(|j| row.by_both(i, j)).collect()).collect();
     Expansion {

@@ -32,6 +32,11 @@ impl<T: Number> Jet<T> {
         Self { value, first, second }
     }
 
+    /// Returns the number of coordinates; 0 for a constant.
+    pub(crate) fn coordinates(&self) -> usize {
+        self.first.len()
+    }
+
     /// Returns ∂/∂qᵢ.
     pub(crate) fn by(&self, i: usize) -> T {
         or_zero(self.first.get(i).and_then(Option::as_ref))

@@ -27,6 +27,7 @@ pub mod fuzz;
 pub mod geometry;
 mod jet;
 pub mod multiprecision;
+pub mod parallel;
 pub mod sample;
 
 pub use audit::assert_derivatives;

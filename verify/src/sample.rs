@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use crate::geometry::{Rotation, difference, is_well_shaped, rotate, shortest_distance};
 
 /// One input of an element, flattened in declared order.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Sample {
     /// Parameters, followed by a constraint's stiffness and damping.
@@ -193,6 +193,24 @@ impl Sampler {
             velocities = self.uniforms(count, -1.0, 1.0);
         }
         Sample { parameters, rest, positions, velocities }
+    }
+
+    /// Draws an input whose points are the rest shape, deformed by principal stretches in a range; `None` if there is no
+    /// rest shape with one point for each point.
+    pub fn strained_sample(&mut self, stretches: (f64, f64)) -> Option<Sample> {
+        let Declaration { rest, points, .. } = self.declaration;
+        let has_shape = has_points(self.declaration) && has_rest_points(self.declaration) && rest.len() == points.len();
+        has_shape.then(|| {
+            let sample = self.sample();
+            let positions = self.deformed(&sample.rest, stretches);
+            Sample { positions, ..sample }
+        })
+    }
+
+    /// Draws an input whose positions or unknowns are a part of ordinary ones.
+    pub fn scaled_sample(&mut self, factor: f64) -> Sample {
+        let sample = self.sample();
+        Sample { positions: sample.positions.iter().map(|x| factor * x).collect(), ..sample }
     }
 
     /// Draws unknowns of one size, from ¼ to 4.

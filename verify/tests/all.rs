@@ -6,6 +6,7 @@ mod broken_elements;
 mod claims;
 mod elementary_functions;
 mod functions;
+mod near_singularities;
 mod printed_mistakes;
 mod random_programs;
 mod sampling;

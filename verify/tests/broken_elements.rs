@@ -3,7 +3,7 @@
 
 use std::panic::catch_unwind;
 
-use energy_dsl::{Declaration, Element, Inputs, Outputs, Real, RestError};
+use energy_dsl::{Declaration, Element, Flags, Inputs, Mask, Outputs, Real, RestError, energy};
 use energy_elements::{BridsonForceDamped, HairBend, QuadraticHinge, Spring, StVK};
 use verify::assert_derivatives;
 
@@ -47,6 +47,63 @@ broken!(NotANumber, HairBend<f64>, "energy", |u| u[0] = u[0] * number(f64::NAN, 
 /// Converts a number to the type of `_like`.
 fn number<T: Real>(value: f64, _like: T) -> T {
     T::from_f64(value)
+}
+
+energy! {
+    /// A logarithm, which has no value for half of all inputs.
+    energy LogDifference(p, q: Point; k: Scalar) { k * log((p - q).x) }
+}
+
+/// A logarithm without flags.
+#[derive(Clone, Copy)]
+struct Unflagged;
+
+impl Element for Unflagged {
+    const DECLARATION: &'static Declaration = <LogDifference<f64> as Element>::DECLARATION;
+    type Over<T: Real> = Self;
+
+    fn evaluate<T: Real>(inputs: &Inputs<'_, T>) -> Result<Outputs<T>, RestError> {
+        let outputs = <LogDifference<f64> as Element>::evaluate(inputs)?;
+        Ok(Outputs { flags: [Flags::clear(); 3], ..outputs })
+    }
+}
+
+/// A spring whose gradient is NaN at nearly coincident points.
+#[derive(Clone, Copy)]
+struct NaNNearby;
+
+impl Element for NaNNearby {
+    const DECLARATION: &'static Declaration = <Spring<f64> as Element>::DECLARATION;
+    type Over<T: Real> = Self;
+
+    fn evaluate<T: Real>(inputs: &Inputs<'_, T>) -> Result<Outputs<T>, RestError> {
+        let mut outputs = <Spring<f64> as Element>::evaluate(inputs)?;
+        let x = inputs.positions;
+        let sum = (0..3).fold(T::from_f64(0.0), |sum, axis| sum + (x[axis] - x[3 + axis]).abs());
+        let found = outputs.blocks.iter_mut().find(|(name, _)| *name == "grad");
+        let numbers = &mut found.expect("a block of that name").1;
+        if sum.less(T::from_f64(1e-3)).any() {
+            numbers[0] = T::from_f64(f64::NAN);
+        }
+        Ok(outputs)
+    }
+}
+
+#[test]
+fn a_value_without_a_flag_outside_of_the_domain_is_found() {
+    let message = message::<Unflagged>();
+    for part in ["flagged outside", "no value"] {
+        assert!(message.contains(part), "no {part} in\n{message}");
+    }
+    assert_derivatives::<LogDifference<f64>>(20);
+}
+
+#[test]
+fn a_nan_near_a_singularity_is_found() {
+    let message = message::<NaNNearby>();
+    for part in ["`grad`", "nearly coincident", "NaN without a flag"] {
+        assert!(message.contains(part), "no {part} in\n{message}");
+    }
 }
 
 #[test]

@@ -221,6 +221,32 @@ fn crates_do_not_depend_on_each_other_in_a_cycle() {
     assert_eq!(cycle(&graph), None, "dependencies, development dependencies included, form a cycle");
 }
 
+/// Returns all crates that a crate of the workspace builds, as far as manifests of the workspace name them. Dependencies
+/// of tests do not count.
+fn named_dependencies(of: &str) -> BTreeSet<String> {
+    let crates: BTreeMap<String, PathBuf> = crates().into_iter().collect();
+    let (mut found, mut open) = (BTreeSet::new(), vec![of.to_owned()]);
+    while let Some(next) = open.pop() {
+        let Some(folder) = crates.get(&next) else { continue };
+        let manifest = manifest(folder);
+        let table = manifest.get("dependencies").and_then(toml::Value::as_table);
+        let names = table.into_iter().flat_map(|table| table.keys().cloned());
+        open.extend(names.filter(|name| found.insert(name.clone())));
+    }
+    found
+}
+
+/// A crate with one element and `#[audit]` builds the library `verify`, which needs no crate of command lines.
+#[test]
+fn the_audit_needs_no_crate_of_the_command_line() {
+    let built = named_dependencies("verify");
+    assert!(built.contains("energy-compiler") && built.contains("dashu-float"), "{built:?}");
+    let others = ["clap", "comfy-table", "console", "energy-cli", "indicatif", "plotters", "serde_json", "sigpipe"];
+    let needless: Vec<&str> = others.into_iter().filter(|name| built.contains(*name)).collect();
+    assert!(needless.is_empty(), "the library `verify` builds {needless:?}");
+    assert!(named_dependencies("verify-command").contains("plotters"));
+}
+
 /// Returns the texts in backticks that look like paths: of several parts, or with the extension of a file.
 fn named_paths(document: &str) -> BTreeSet<&str> {
     let is_part = |part: &str| part.len() > 1 && part.chars().all(|c| c.is_alphanumeric() || "._-".contains(c));

@@ -28,7 +28,7 @@ mod tape;
 pub use check::unit_exponents;
 pub use diagnostic::{Diagnostic, Diagnostics};
 pub use functions::{Function, all as functions, robust_spellings};
-pub use inspect::{Fault, Listing, Mutation, Path, Textbook, mathml};
+pub use inspect::{Fault, Listing, Mutation, Part, Parts, Path, Textbook, mathml};
 pub use interpreted::{BindError, Elements, EvaluateError, InputKind, InputNumbers, Interpreted, Layouts};
 pub use passes::{compile, compile_file};
 pub use syntax::{AuditRange, AuditScope, canonical as canonical_name};

@@ -43,7 +43,7 @@ fn a_file_is_audited_reported_and_run_again_at_its_inputs() {
         assert!(page.contains(part), "no {part}");
     }
     assert!(!page.contains("http-equiv") && !page.contains("src="), "the page needs nothing else");
-    assert!(page.contains("Not looked at") && page.contains("`verify stress` looks there"));
+    assert!(page.contains("Not looked at") && page.contains("`verify stress` goes closer"));
     let written: serde_json::Value = serde_json::from_str(&std::fs::read_to_string(&json).unwrap()).unwrap();
     assert_eq!(written["not_looked_at"].as_array().map(Vec::len), Some(2));
     assert_eq!(written["sections"][0]["inputs"], 6);
@@ -114,6 +114,40 @@ fn sweeps_of_a_distance_keep_the_digits_that_the_textbook_form_loses() {
     let printed = text(&output.stdout);
     assert!(output.status.success(), "{printed}{}", text(&output.stderr));
     assert!(printed.contains("0 failed") && printed.contains("| Distance | scale | hess |"), "{printed}");
+}
+
+/// Lost digits near rest are warnings: the exit status is 0.
+#[test]
+fn lost_digits_are_warnings_with_a_remedy() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("solid.energy").to_str().unwrap().to_owned();
+    std::fs::write(
+        &file,
+        "energy Solid(x0, x1, x2, x3: Point; rest X0, X1, X2, X3: Vec3; mu, la: Scalar) {
+            rest { let D = columns(X1 - X0, X2 - X0, X3 - X0); let B = inverse(D); let V = det(D) / 6; }
+            let F = columns(x1 - x0, x2 - x0, x3 - x0) * B;
+            let J = det(F);
+            V * (mu / 2 * (ddot(F, F) - 3) - mu * log(J) + la / 2 * log(J)^2)
+        }",
+    )
+    .unwrap();
+    let output = verify(&["audit", "--quick", "--file", &file]);
+    let printed = text(&output.stdout);
+    assert!(output.status.success(), "{printed}{}", text(&output.stderr));
+    let warning = "warning: Solid: block `energy` loses digits near rest";
+    for part in [warning, "- mu * log(J)", "`log1pmx(x)`", "random inputs were replaced", "0 failed"] {
+        assert!(printed.contains(part), "no {part} in {printed}");
+    }
+}
+
+#[test]
+fn the_output_does_not_depend_on_the_number_of_threads() {
+    for command in [&["audit", "--quick", "StVK", "Spring", "Distance"][..], &["stress", "Distance", "HairBend"]] {
+        let [one, three] = ["1", "3"].map(|threads| verify(&[command, &["--threads", threads]].concat()));
+        assert!(one.status.success() && one.stdout == three.stdout, "{command:?}");
+        assert!(text(&one.stdout).contains("0 failed"), "{command:?}");
+    }
+    assert_eq!(verify(&["stress", "--threads", "0"]).status.code(), Some(2));
 }
 
 #[test]

@@ -3,10 +3,12 @@ use fastrand::Rng;
 
 use super::subject::Subject;
 use crate::blocks::{Answer, BlockName};
-use crate::multiprecision::{TrueBlock, worse};
+use crate::multiprecision::{TrueBlock, truth_of_extreme, worse};
 use crate::sample::{Sample, has_points};
 
-const ROUNDOFF: f64 = f64::EPSILON / 2.0;
+pub(super) const ROUNDOFF: f64 = f64::EPSILON / 2.0;
+/// Digits of multi-precision blocks near singularities.
+pub(super) const DIGITS: usize = 25;
 
 /// Returns the largest error in units of roundoff of the block's largest number. Errors of a zero block are relative to
 /// its natural size.
@@ -61,16 +63,34 @@ fn enters_as_edges(declaration: &Declaration) -> bool {
 }
 
 fn perturbed(declaration: &Declaration, sample: &Sample, what: Perturbed, random: &mut Rng) -> Sample {
-    let mut nudge = |x: f64| if random.bool() { x * PERTURBATION } else { -x * PERTURBATION };
+    let offset = offset(declaration, sample, (what, PERTURBATION), random);
+    let sum = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a + b).collect();
+    Sample {
+        parameters: sum(&sample.parameters, &offset.parameters),
+        rest: sum(&sample.rest, &offset.rest),
+        positions: sum(&sample.positions, &offset.positions),
+        velocities: sum(&sample.velocities, &offset.velocities),
+    }
+}
+
+/// Returns perturbations of a relative size and random signs.
+fn offset(declaration: &Declaration, sample: &Sample, (what, size): (Perturbed, f64), random: &mut Rng) -> Sample {
+    let mut nudge = |x: f64| if random.bool() { x * size } else { -x * size };
     let edges = |numbers: &[f64], dimension: usize, nudge: &mut dyn FnMut(f64) -> f64| -> Vec<f64> {
         let origin = &numbers[..dimension];
-        numbers.iter().enumerate().map(|(i, &x)| x + nudge(x - origin[i % dimension])).collect()
+        numbers.iter().enumerate().map(|(i, &x)| nudge(x - origin[i % dimension])).collect()
     };
     let all = |numbers: &[f64], nudge: &mut dyn FnMut(f64) -> f64| -> Vec<f64> {
-        numbers.iter().map(|&x| x + nudge(x)).collect()
+        numbers.iter().map(|&x| nudge(x)).collect()
     };
+    let none = |numbers: &[f64]| vec![0.0; numbers.len()];
     if what == Perturbed::Parameters {
-        return Sample { parameters: all(&sample.parameters, &mut nudge), ..sample.clone() };
+        return Sample {
+            parameters: all(&sample.parameters, &mut nudge),
+            rest: none(&sample.rest),
+            positions: none(&sample.positions),
+            velocities: none(&sample.velocities),
+        };
     }
     let by_edges = enters_as_edges(declaration);
     let positions = match by_edges {
@@ -82,8 +102,31 @@ fn perturbed(declaration: &Declaration, sample: &Sample, what: Perturbed, random
         None => all(&sample.rest, &mut nudge),
     };
     let velocities = if sample.velocities.is_empty() { Vec::new() } else { edges(&sample.velocities, 3, &mut nudge) };
-    let parameters = if by_edges { sample.parameters.clone() } else { all(&sample.parameters, &mut nudge) };
+    let parameters = if by_edges { none(&sample.parameters) } else { all(&sample.parameters, &mut nudge) };
     Sample { parameters, rest, positions, velocities }
+}
+
+/// Returns κ of all blocks in multi-precision, in the order of the blocks, and the bits spent. Inputs are perturbed by a
+/// roundoff: near a singularity, larger perturbations would leave its neighbourhood.
+pub(super) fn true_amplifications(subject: &Subject, sample: &Sample, here: &[TrueBlock]) -> (Vec<f64>, usize) {
+    let mut random = Rng::with_seed(1);
+    let parameters = enters_as_edges(subject.declaration) && !sample.parameters.is_empty();
+    let patterns = [Perturbed::Geometry; 3].into_iter().chain(parameters.then_some(Perturbed::Parameters));
+    let (mut most, mut bits) = (vec![0.0_f64; here.len()], 0);
+    for what in patterns {
+        let offset = offset(subject.declaration, sample, (what, ROUNDOFF), &mut random);
+        let there = truth_of_extreme(subject.declaration, &subject.formula, sample, Some(&offset), DIGITS);
+        bits += there.bits;
+        for (number, (a, b)) in here.iter().zip(&there.blocks).enumerate() {
+            let pairs = a.block.numbers.iter().zip(&b.block.numbers);
+            let change = pairs.map(|(a, b)| (a.clone() - b.clone()).to_f64().abs()).fold(0.0, worse);
+            let kappa = change / a.largest() / ROUNDOFF;
+            if kappa.is_finite() {
+                most[number] = most[number].max(kappa);
+            }
+        }
+    }
+    (most, bits)
 }
 
 /// Returns the dimension of the rest shape's points; `None` if the rest shape has no points.
@@ -140,7 +183,7 @@ mod tests {
                 let sample = Sample { parameters, rest, positions, velocities };
                 let answer = subject.answer(&sample).unwrap();
                 let got = in_single_precision(evaluate, &sample);
-                for truth in truth_of_ordinary(declaration, &subject.formula, &sample, 12) {
+                for truth in truth_of_ordinary(declaration, &subject.formula, &sample, 12).blocks {
                     let name = truth.block.name;
                     let numbers = &got.iter().find(|(found, _)| *found == name.name()).unwrap().1;
                     let error = truth.block.numbers.iter().zip(numbers).map(|(t, &g)| t.error_of(g)).fold(0.0, worse);

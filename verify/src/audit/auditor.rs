@@ -1,4 +1,4 @@
-//! An element under audit: inputs with their expected results, and the findings.
+//! An element under audit, and the findings.
 
 use std::collections::BTreeMap;
 
@@ -6,72 +6,9 @@ use energy_dsl::Declaration;
 
 use super::report::{Check, Line};
 use super::subject::Subject;
-use crate::blocks::{Answer, Block, BlockName, NoAnswer};
+use crate::blocks::{Answer, BlockName, NoAnswer};
 use crate::finite_difference::{Stepped, antiderivative};
-use crate::formula::expected_blocks;
-use crate::geometry::{Rotation, rotate_all};
-use crate::multiprecision::{TrueBlock, truth_of_ordinary};
 use crate::sample::Sample;
-
-/// An input with the expected results, which do not depend on the code under audit.
-pub(super) struct Case {
-    pub(super) sample: Sample,
-    pub(super) turn: Rotation,
-    /// Blocks by hyper-dual numbers through the textbook form.
-    pub(super) dual: Vec<Block>,
-    /// Blocks in multi-precision; empty for most cases, because they are slow.
-    pub(super) truth: Vec<TrueBlock>,
-}
-
-impl Case {
-    pub(super) fn turned(&self, vectors: &[f64]) -> Vec<f64> {
-        rotate_all(&self.turn, vectors)
-    }
-
-    pub(super) fn dual(&self, name: BlockName) -> &Block {
-        self.dual.iter().find(|block| block.name == name).expect("the same kind has the same blocks")
-    }
-
-    pub(super) fn truth(&self, name: BlockName) -> Option<&TrueBlock> {
-        self.truth.iter().find(|truth| truth.block.name == name)
-    }
-}
-
-/// Digits of the multi-precision blocks.
-const DIGITS: usize = 25;
-/// One in this many inputs has integer coordinates.
-const LATTICE: usize = 5;
-
-/// Draws inputs from a seed; the first `with_truth` get multi-precision blocks.
-pub(super) fn cases(subject: &Subject, samples: usize, with_truth: usize, seed: u64) -> Vec<Case> {
-    let mut sampler = subject.sampler(seed);
-    (0..samples)
-        .map(|number| {
-            let is_lattice = number % LATTICE == LATTICE - 1;
-            let mut sample = if is_lattice { sampler.lattice_sample() } else { sampler.sample() };
-            if is_lattice && is_flagged(subject, &sample) {
-                sample = sampler.sample();
-            }
-            case(subject, sample, sampler.rotation(), number < with_truth)
-        })
-        .collect()
-}
-
-/// Whether the element flags an input as degenerate, so that no result can be expected.
-fn is_flagged(subject: &Subject, sample: &Sample) -> bool {
-    subject.answer(sample).is_ok_and(|answer| answer.flags.iter().any(|flags| flags.any()))
-}
-
-/// Creates the case of a given input.
-pub(super) fn case(subject: &Subject, sample: Sample, turn: Rotation, with_truth: bool) -> Case {
-    let Subject { declaration, formula, .. } = subject;
-    Case {
-        dual: expected_blocks(declaration, formula, &sample),
-        truth: if with_truth { truth_of_ordinary(declaration, formula, &sample, DIGITS) } else { Vec::new() },
-        sample,
-        turn,
-    }
-}
 
 /// The element under audit, and the findings so far.
 pub(super) struct Auditor<'a> {

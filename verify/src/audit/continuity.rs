@@ -2,7 +2,8 @@
 
 use energy_dsl::Kind;
 
-use super::auditor::{Auditor, Case};
+use super::auditor::Auditor;
+use super::cases::Case;
 use super::report::Check;
 use crate::blocks::{Block, BlockName};
 use crate::sample::{Sample, has_points};
@@ -13,7 +14,7 @@ const HALVINGS: usize = 70;
 impl Auditor<'_> {
     /// Walks from the input to others. Where the branches of the formula change, the values on both sides must agree. A
     /// force may jump, as Coulomb friction does, and so may a residual: blended rotations choose a hemisphere.
-    pub(super) fn continuity(&mut self, case: &Case, other: &Sample, typical: f64) {
+    pub(super) fn continuity(&mut self, case: &Case<'_>, other: &Sample, typical: f64) {
         let value = match self.declaration.kind {
             Kind::Energy => BlockName::Energy,
             Kind::Constraint => BlockName::Constraint,
@@ -23,6 +24,9 @@ impl Auditor<'_> {
             return;
         }
         for end in self.destinations(case, other) {
+            if case.is_bounded && self.subject.is_outside(&end) {
+                continue;
+            }
             if let Some([before, after]) = self.crossing(&case.sample, &end) {
                 self.compare_sides((value, typical), &before, &after, [&case.sample, &end]);
             }
@@ -31,7 +35,7 @@ impl Auditor<'_> {
 
     /// Returns where the walks from an input end: another input, another orientation and, unless the declaration limits
     /// its domain, a tenth of the size.
-    fn destinations(&self, case: &Case, other: &Sample) -> Vec<Sample> {
+    fn destinations(&self, case: &Case<'_>, other: &Sample) -> Vec<Sample> {
         let positions = &case.sample.positions;
         let mut ends = vec![other.positions.clone()];
         if has_points(self.declaration) {
@@ -111,8 +115,8 @@ impl Auditor<'_> {
 }
 
 /// Returns the median size of the values at all inputs, of those that do not vanish.
-pub(super) fn typical_value(cases: &[Case]) -> f64 {
-    let size = |case: &Case| case.dual.first().map_or(0.0, Block::largest);
+pub(super) fn typical_value(cases: &[Case<'_>]) -> f64 {
+    let size = |case: &Case<'_>| case.duals().first().map_or(0.0, Block::largest);
     let mut sizes: Vec<f64> = cases.iter().map(size).filter(|&size| size > 0.0 && size.is_finite()).collect();
     sizes.sort_by(f64::total_cmp);
     sizes.get(sizes.len() / 2).copied().unwrap_or(0.0)

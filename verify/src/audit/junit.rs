@@ -1,6 +1,5 @@
 use std::fmt::Write as _;
 
-use super::html::escaped;
 use super::report::{Report, describe_failure};
 
 /// Formats the report as JUnit XML: one suite per element, one case per check of a block and per planted fault.
@@ -57,4 +56,10 @@ pub fn junit(report: &Report) -> String {
         "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<testsuites tests=\"{tests}\" failures=\"{failures}\" \
          errors=\"{errors}\">\n{suites}</testsuites>\n"
     )
+}
+
+/// Escapes the characters that XML and HTML reserve.
+#[must_use]
+pub fn escaped(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }

@@ -4,7 +4,8 @@
 use energy_compiler::unit_exponents;
 use energy_dsl::Kind;
 
-use super::auditor::{Auditor, Case, Finding};
+use super::auditor::{Auditor, Finding};
+use super::cases::Case;
 use super::entry::entry_name;
 use super::momentum::momentum_errors;
 use super::report::Check;
@@ -19,7 +20,7 @@ const OUT_OF_DOMAIN: &str =
 
 impl Auditor<'_> {
     /// Checks every law at one input.
-    pub(super) fn laws(&mut self, case: &Case, answer: &Answer) -> Result<(), NoAnswer> {
+    pub(super) fn laws(&mut self, case: &Case<'_>, answer: &Answer) -> Result<(), NoAnswer> {
         let has_points = has_points(self.declaration);
         self.finite(&case.sample, answer);
         self.repeats(&case.sample, answer);
@@ -54,6 +55,21 @@ impl Auditor<'_> {
                 None => format!("  flagged as degenerate or a kink, at{}", sample.describe(declaration)),
             });
         }
+    }
+
+    /// Checks that a value where the formula has none is flagged.
+    pub(super) fn outside(&mut self, sample: &Sample) {
+        let Ok(answer) = self.answer(sample) else { return };
+        let Some(block) = answer.blocks.first() else { return };
+        let error = if answer.flags[0].degenerate { 0.0 } else { f64::INFINITY };
+        let declaration = self.declaration;
+        self.note(Check::Outside, block.name, error, sample, || {
+            format!(
+                "  the formula has no value, but the result is {:?} without a flag, at{}",
+                block.numbers,
+                sample.describe(declaration)
+            )
+        });
     }
 
     /// Records a finding without an order of convergence.
@@ -110,7 +126,7 @@ impl Auditor<'_> {
     /// Checks momentum balance. With a potential, translation invariance implies Σ f = 0 and rotation invariance
     /// implies Σ x × f = 0. A force without a potential may obey either law or not, and must do what its own textbook
     /// form does.
-    fn momenta(&mut self, case: &Case, answer: &Answer) {
+    fn momenta(&mut self, case: &Case<'_>, answer: &Answer) {
         let sample = &case.sample;
         let close = |a: f64, b: f64| (a - b).abs() <= 1e-10 * a.abs().max(b.abs());
         let formula = &self.subject.formula;

@@ -2,12 +2,15 @@
 
 mod accuracy;
 mod auditor;
+mod budget;
+mod cases;
 mod continuity;
+mod culprit;
 mod entry;
-mod html;
-mod input;
+mod extremes;
 mod junit;
 mod laws;
+mod losses;
 mod momentum;
 mod mutations;
 mod properties;
@@ -15,24 +18,25 @@ mod report;
 mod routes;
 mod subject;
 
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::num::NonZero;
 
 use energy_dsl::{AnyElement, Declaration, Element};
 
 pub use self::accuracy::amplification;
-use self::auditor::{Auditor, Case, case, cases};
+use self::auditor::Auditor;
+use self::budget::Meter;
+use self::cases::{Case, Cases, cases};
 use self::continuity::typical_value;
-pub use self::html::html;
-pub use self::input::read_inputs;
-pub use self::junit::junit;
+pub use self::junit::{escaped, junit};
+use self::losses::Losses;
 pub use self::report::{
-    Accuracy, Check, Line, Mutant, MutationScore, Report, Section, Spot, StepCurve, describe_failure,
+    Accuracy, Check, Line, Mutant, MutationScore, Report, Section, Spot, StepCurve, Warning, describe_failure,
 };
 pub use self::subject::{EvaluateAny, Subject, Target};
 use crate::blocks::{BlockName, Evaluate, NoAnswer};
 use crate::geometry::{Rotation, longest_distance, shortest_distance};
 use crate::multiprecision::TrueBlock;
+use crate::parallel;
 use crate::sample::{Sample, has_points};
 
 /// Thoroughness of an audit.
@@ -48,13 +52,30 @@ pub struct Options {
     pub mutations: usize,
     /// Number of inputs at which a fault may be noticed.
     pub trials: usize,
+    /// Number of inputs near rest and near singularities.
+    pub extremes: usize,
+    /// Operations of doubles that an element may take. What exceeds them is left out, and reported. They are counted
+    /// from the operations of the element, so reports do not depend on the speed of a machine.
+    pub budget: u64,
     /// Seed of the random inputs.
     pub seed: u64,
+    /// Number of threads; `None` uses all processors. Reports do not depend on it.
+    pub threads: Option<NonZero<usize>>,
 }
 
 impl Default for Options {
     fn default() -> Self {
-        Self { samples: 200, declared_samples: false, truths: 24, mutations: 24, trials: 40, seed: 1 }
+        Self {
+            samples: 200,
+            declared_samples: false,
+            truths: 24,
+            mutations: 24,
+            trials: 40,
+            extremes: 60,
+            budget: 25_000_000_000,
+            seed: 1,
+            threads: None,
+        }
     }
 }
 
@@ -62,7 +83,15 @@ impl Options {
     /// Options for every change of the code: seconds for all elements.
     #[must_use]
     pub fn quick() -> Self {
-        Self { samples: 20, truths: 5, mutations: 10, trials: 25, ..Self::default() }
+        Self {
+            samples: 20,
+            truths: 5,
+            mutations: 10,
+            trials: 25,
+            extremes: 10,
+            budget: 2_500_000_000,
+            ..Self::default()
+        }
     }
 }
 
@@ -80,30 +109,12 @@ pub fn targets_in(catalogue: &'static [AnyElement], names: &[&str]) -> Result<Ve
     Ok(chosen.map(Target::of_element).collect())
 }
 
-/// Audits all targets on all processors; the report is in their order. If an energy is given, the targets are forces
-/// that must be minus its gradient, at the same points and with its parameters by name.
+/// Audits all targets; the report is in their order, for any number of threads. If an energy is given, the targets are
+/// forces that must be minus its gradient, at the same points and with its parameters by name.
 #[must_use]
 pub fn audit_all(targets: &[Target], energy: Option<&Target>, options: Options) -> Report {
-    let next = AtomicUsize::new(0);
-    let reports: Mutex<Vec<Option<Report>>> = Mutex::new(targets.iter().map(|_| None).collect());
-    let workers = std::thread::available_parallelism().map_or(1, usize::from).min(targets.len());
-    std::thread::scope(|scope| {
-        for _ in 0..workers {
-            scope.spawn(|| {
-                while let Some((number, target)) = {
-                    let number = next.fetch_add(1, Ordering::Relaxed);
-                    targets.get(number).map(|target| (number, target))
-                } {
-                    let report = audit_target(target, energy, options);
-                    if let Ok(mut reports) = reports.lock() {
-                        reports[number] = Some(report);
-                    }
-                }
-            });
-        }
-    });
     let mut all = Report::default();
-    for report in reports.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner).into_iter().flatten() {
+    for report in parallel::map(targets, options.threads, Target::cost, |t| audit_target(t, energy, options)) {
         all.extend(report);
     }
     all
@@ -129,7 +140,7 @@ pub fn audit_at(target: &Target, energy: Option<&Target>, sample: &Sample) -> Re
     let subject = target.subject()?;
     sample.fits(subject.declaration)?;
     let turn = Rotation::from_unit_quaternion([0.5, -0.5, 0.5, 0.5]);
-    let case = case(&subject, sample.clone(), turn, true);
+    let case = Case::new(&subject, sample.clone(), turn, true);
     let mut section = section(&subject, 1);
     let mut auditor = Auditor::new(&subject);
     audit_case(&mut auditor, &mut section, &case).map_err(|error| error.to_string())?;
@@ -148,16 +159,35 @@ pub fn audit(declaration: &'static Declaration, evaluate: Evaluate, options: Opt
 
 fn run(subject: &Subject, energy: Option<&Subject>, options: Options) -> Result<Report, String> {
     let declared = subject.declared_samples().filter(|_| options.declared_samples);
-    let cases = cases(subject, declared.unwrap_or(options.samples), options.truths, options.seed);
+    let samples = declared.unwrap_or(options.samples);
+    let Cases { list: cases, outside, outside_inputs, missing } = cases(subject, samples, options.truths, options.seed);
+    if cases.is_empty() && samples > 0 {
+        return Err(
+            "the formula has no value at any input tried; state where it has one, as in #[audit(domain(strain = \
+                    0.5..2.0))]"
+                .into(),
+        );
+    }
     let mut auditor = Auditor::new(subject);
-    let mut section = section(subject, cases.len());
+    let mut section = Section { outside, ..section(subject, cases.len()) };
+    let mut budget = Budget { section: &mut section, meter: &subject.meter, limit: options.budget / 3 };
+    budget.left_out(missing, samples, "inputs, not found in the domain");
     let typical = typical_value(&cases);
     for (number, case) in cases.iter().enumerate() {
-        audit_case(&mut auditor, &mut section, case).map_err(|error| error.to_string())?;
+        if number >= FEWEST && budget.is_spent() {
+            budget.left_out(cases.len() - number, cases.len(), "inputs");
+            break;
+        }
+        audit_case(&mut auditor, budget.section, case).map_err(|error| error.to_string())?;
         auditor.continuity(case, &cases[(number + 1) % cases.len()].sample, typical);
         if let Some(energy) = energy {
             against_energy(&mut auditor, energy, case)?;
         }
+    }
+    outside_inputs.iter().for_each(|sample| auditor.outside(sample));
+    budget.limit = 2 * (options.budget / 3);
+    if let Some(first) = cases.first() {
+        look_near_singularities(&mut auditor, &mut budget, &first.sample, options);
     }
     if let Some(last) = cases.last() {
         section.without_differences = auditor.rejected_differences(&last.sample);
@@ -165,11 +195,55 @@ fn run(subject: &Subject, energy: Option<&Subject>, options: Options) -> Result<
     let lines = auditor.lines;
     // Faults in a faulty element tell nothing.
     if options.mutations > 0 && lines.iter().all(|line| line.passed) {
-        let score =
-            subject.interpreted.as_ref().map(|i| mutations::score(i, options.mutations, options.trials, options.seed));
+        let score = subject.interpreted.as_ref().map(|interpreted| {
+            let budget = (&subject.meter, options.budget);
+            mutations::score(interpreted, options.mutations, options.trials, options.seed, budget)
+        });
         section.mutations = score.transpose()?;
+        if let Some(left_out) = section.mutations.as_ref().map(|score| score.left_out).filter(|&number| number > 0) {
+            section.left_out.push(format!("{left_out} of {} planted faults", options.mutations));
+        }
     }
     Ok(Report { lines, sections: vec![section], refused: Vec::new() })
+}
+
+/// Ordinary inputs that are looked at whatever they cost.
+const FEWEST: usize = 3;
+
+/// A limit of the operations, and the section that lists what it leaves out.
+struct Budget<'a> {
+    section: &'a mut Section,
+    meter: &'a Meter,
+    limit: u64,
+}
+
+impl Budget<'_> {
+    fn is_spent(&self) -> bool {
+        self.meter.spent() > self.limit
+    }
+
+    fn left_out(&mut self, count: usize, of: usize, what: &str) {
+        if count > 0 {
+            self.section.left_out.push(format!("{count} of {of} {what}"));
+        }
+    }
+}
+
+/// Looks at inputs near rest and near singularities, and warns of losses of digits.
+fn look_near_singularities(auditor: &mut Auditor<'_>, budget: &mut Budget<'_>, ordinary: &Sample, options: Options) {
+    let mut inputs = extremes::extremes(auditor.subject, ordinary, options.seed);
+    inputs.truncate(options.extremes);
+    let mut losses = Losses::default();
+    let count = inputs.len();
+    for (number, extreme) in inputs.into_iter().enumerate() {
+        if budget.is_spent() {
+            budget.left_out(count - number, count, "inputs near rest and near singularities");
+            break;
+        }
+        auditor.extreme(extreme, &mut losses);
+    }
+    budget.section.extremes = losses.inputs;
+    budget.section.warnings = losses.warnings(auditor);
 }
 
 fn section(subject: &Subject, inputs: usize) -> Section {
@@ -184,11 +258,15 @@ fn section(subject: &Subject, inputs: usize) -> Section {
         accuracy: Vec::new(),
         curves: Vec::new(),
         spots: Vec::new(),
+        extremes: 0,
+        warnings: Vec::new(),
+        outside: 0,
+        left_out: Vec::new(),
         mutations: None,
     }
 }
 
-fn audit_case(auditor: &mut Auditor<'_>, section: &mut Section, case: &Case) -> Result<(), NoAnswer> {
+fn audit_case(auditor: &mut Auditor<'_>, section: &mut Section, case: &Case<'_>) -> Result<(), NoAnswer> {
     let answer = auditor.answer(&case.sample)?;
     auditor.laws(case, &answer)?;
     let curves = auditor.routes(case, &answer, &mut section.accuracy)?;
@@ -199,14 +277,14 @@ fn audit_case(auditor: &mut Auditor<'_>, section: &mut Section, case: &Case) -> 
         let size = longest_distance(&case.sample.positions).unwrap_or(1.0);
         let shape = shortest_distance(&case.sample.positions).unwrap_or(size) / size;
         let error = |truth: &TrueBlock| truth.error_in_roundoffs(&answer.block(truth.block.name).numbers);
-        let spots = case.truth.iter().filter(|truth| truth.is_defined && truth.largest() > 0.0);
+        let spots = case.truths().iter().filter(|truth| truth.is_defined && truth.largest() > 0.0);
         section.spots.extend(spots.map(|t| Spot { block: t.block.name, size, shape, error: error(t) }));
     }
     Ok(())
 }
 
 /// Compares a force with minus the gradient of an energy at one input.
-fn against_energy(auditor: &mut Auditor<'_>, energy: &Subject, case: &Case) -> Result<(), String> {
+fn against_energy(auditor: &mut Auditor<'_>, energy: &Subject, case: &Case<'_>) -> Result<(), String> {
     let (force, potential) = (auditor.declaration, energy.declaration);
     if !auditor.subject.has_velocities() {
         return Err(format!("{} is not a force, so it cannot be compared with {}", force.name, potential.name));
@@ -242,7 +320,7 @@ fn against_energy(auditor: &mut Auditor<'_>, energy: &Subject, case: &Case) -> R
 /// If a check fails. The message has the element, block and entry, the results of all routes, the step of the
 /// differences, and the input.
 pub fn assert_derivatives<E: Element>(samples: usize) {
-    let options = Options { samples, truths: samples.min(5), mutations: 0, ..Options::default() };
+    let options = Options { samples, truths: samples.min(5), mutations: 0, extremes: 10, ..Options::default() };
     let report = audit(E::DECLARATION, E::evaluate::<f64>, options);
     let mut problems: Vec<String> =
         report.refused.iter().map(|(name, why)| format!("{name} cannot be audited: {why}")).collect();

@@ -7,7 +7,9 @@ use energy_dsl::{Inputs, Number, Outputs};
 use fastrand::Rng;
 
 use super::amplification;
-use super::auditor::{Auditor, Case, case, cases};
+use super::auditor::Auditor;
+use super::budget::Meter;
+use super::cases::{Case, cases};
 use super::report::{Check, Mutant, MutationScore};
 use super::subject::Subject;
 use crate::blocks::{BlockName, NoAnswer};
@@ -15,7 +17,8 @@ use crate::multiprecision::{Big, worse};
 use crate::sample::Sample;
 
 /// Plants up to `wanted` faults, spread over kinds and routines, and tries each at `trials` inputs. Faults that
-/// provably change nothing are counted separately.
+/// provably change nothing are counted separately. The last faults are left out if the audit has taken more than the
+/// limit of operations.
 ///
 /// # Errors
 /// If an input has no result even without a fault.
@@ -24,24 +27,31 @@ pub(super) fn score(
     wanted: usize,
     inputs: usize,
     seed: u64,
+    (meter, limit): (&Meter, u64),
 ) -> Result<MutationScore, String> {
-    let subject = subject(interpreted)?;
-    let mut trials: Vec<Trial> = cases(&subject, inputs, inputs, seed ^ 0x6d75_7461_7465)
+    let subject = subject(interpreted, meter)?;
+    let mut trials: Vec<Trial<'_>> = cases(&subject, inputs, inputs, seed ^ 0x6d75_7461_7465)
+        .list
         .into_iter()
         .map(|case| Trial { case, fails_anyway: Vec::new() })
         .collect();
-    trials.extend(rare_branches(&subject, interpreted, &trials, seed));
+    trials.extend(rare_branches(&subject, interpreted, &trials, seed, limit));
     let mut score = MutationScore::default();
     for mutation in spread(interpreted.mutations(), seed) {
         if score.mutants.len() == wanted {
             break;
         }
+        if meter.spent() > limit && !score.mutants.is_empty() {
+            score.left_out = wanted - score.mutants.len();
+            break;
+        }
+        meter.compilation();
         if interpreted.is_proved_equivalent(&mutation) {
             score.equivalent += 1;
             continue;
         }
         let broken = interpreted.mutated(&mutation);
-        let caught_by = caught_by(&self::subject(&broken)?, &trials);
+        let caught_by = caught_by(&self::subject(&broken, meter)?, &trials);
         if caught_by.is_empty() {
             match largest_difference(&subject, interpreted, &broken, &trials) {
                 Some(0.0) => {
@@ -60,8 +70,11 @@ pub(super) fn score(
     Ok(score)
 }
 
-fn subject(interpreted: &Interpreted) -> Result<Subject, String> {
-    Subject::of_routines(interpreted, None)
+/// Creates a subject that counts its operations together with the element's own.
+fn subject(interpreted: &Interpreted, meter: &Meter) -> Result<Subject, String> {
+    let mut subject = Subject::of_routines(interpreted, None)?;
+    subject.meter = meter.clone();
+    Ok(subject)
 }
 
 /// Returns by how much an unnoticed fault changes results without rounding: the largest difference at any input,
@@ -70,9 +83,15 @@ fn subject(interpreted: &Interpreted) -> Result<Subject, String> {
 /// For a block, that is twice the allowed error of accuracy, 8 u·max(1, κ), because rounding may hide as much. For a
 /// block that another routine repeats, it is the allowed difference between routines. The last coefficient of a series
 /// changes only last bits. An operation that no input reaches, or whose other operand is always 1, changes nothing.
-fn largest_difference(subject: &Subject, sound: &Interpreted, broken: &Interpreted, trials: &[Trial]) -> Option<f64> {
+fn largest_difference(
+    subject: &Subject,
+    sound: &Interpreted,
+    broken: &Interpreted,
+    trials: &[Trial<'_>],
+) -> Option<f64> {
     let mut most = 0.0_f64;
     for Trial { case, .. } in trials {
+        subject.meter.exact_routines();
         let [blocks, repeats] = exact_differences(sound, broken, &case.sample)?;
         let answer = subject.answer(&case.sample).ok()?;
         let names = BlockName::of_kind(subject.declaration.kind).iter();
@@ -110,13 +129,19 @@ fn relative_difference(a: &[Big], b: &[Big]) -> f64 {
 }
 
 /// An input, and the checks that fail there without a fault: near a singularity some routes lose their digits.
-struct Trial {
-    case: Case,
+struct Trial<'a> {
+    case: Case<'a>,
     fails_anyway: Vec<Check>,
 }
 
 /// Searches for an input with each outcome of a comparison that ordinary inputs do not have.
-fn rare_branches(subject: &Subject, interpreted: &Interpreted, ordinary: &[Trial], seed: u64) -> Vec<Trial> {
+fn rare_branches<'a>(
+    subject: &'a Subject,
+    interpreted: &Interpreted,
+    ordinary: &[Trial<'_>],
+    seed: u64,
+    limit: u64,
+) -> Vec<Trial<'a>> {
     const CANDIDATES: usize = 4000;
     let branches = |sample: &Sample| interpreted.branches(&sample.inputs()).ok();
     let mut seen: BTreeSet<(usize, bool)> = BTreeSet::new();
@@ -127,15 +152,20 @@ fn rare_branches(subject: &Subject, interpreted: &Interpreted, ordinary: &[Trial
     let mut sampler = subject.sampler(seed ^ 0x6272_616e_6368);
     let mut found = Vec::new();
     for _ in 0..CANDIDATES {
-        if seen.len() == 2 * comparisons {
+        if seen.len() == 2 * comparisons || subject.meter.spent() > limit {
             break;
         }
         let sample = sampler.odd_sample();
+        subject.meter.answer(0);
         let Some(taken) = branches(&sample) else { continue };
         if taken.iter().enumerate().all(|(number, &outcome)| seen.contains(&(number, outcome))) {
             continue;
         }
-        let case = case(subject, sample, sampler.rotation(), true);
+        let turn = sampler.rotation();
+        if subject.is_outside(&sample) {
+            continue;
+        }
+        let case = Case::new(subject, sample, turn, true);
         let mut auditor = Auditor::new(subject);
         let sound = look(&mut auditor, &case).is_ok();
         let fails_anyway = failed(&auditor);
@@ -156,7 +186,7 @@ fn failed(auditor: &Auditor<'_>) -> Vec<Check> {
 }
 
 /// Returns the checks that fail because of the fault, at the first input where any does.
-fn caught_by(broken: &Subject, trials: &[Trial]) -> Vec<Check> {
+fn caught_by(broken: &Subject, trials: &[Trial<'_>]) -> Vec<Check> {
     for trial in trials {
         let mut auditor = Auditor::new(broken);
         // A failed evaluation counts as noticed.
@@ -172,7 +202,7 @@ fn caught_by(broken: &Subject, trials: &[Trial]) -> Vec<Check> {
     Vec::new()
 }
 
-fn look(auditor: &mut Auditor<'_>, case: &Case) -> Result<(), NoAnswer> {
+fn look(auditor: &mut Auditor<'_>, case: &Case<'_>) -> Result<(), NoAnswer> {
     let answer = auditor.answer(&case.sample)?;
     auditor.laws(case, &answer)?;
     auditor.routes(case, &answer, &mut Vec::new())?;

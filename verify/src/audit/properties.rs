@@ -2,14 +2,15 @@
 
 use energy_dsl::{Kind, Property};
 
-use super::auditor::{Auditor, Case};
+use super::auditor::Auditor;
+use super::cases::Case;
 use super::report::Check;
 use crate::blocks::{Answer, BlockName, NoAnswer, largest};
 use crate::sample::Sample;
 
 impl Auditor<'_> {
     /// Checks each claim at one input.
-    pub(super) fn claims(&mut self, case: &Case, answer: &Answer) -> Result<(), NoAnswer> {
+    pub(super) fn claims(&mut self, case: &Case<'_>, answer: &Answer) -> Result<(), NoAnswer> {
         let sample = &case.sample;
         let turn = |vectors: &[f64]| case.turned(vectors);
         for property in self.declaration.properties {

@@ -37,13 +37,16 @@ pub enum Check {
     MinusGradient,
     /// The velocity-dependent part of the force dissipates power.
     Dissipation,
-    /// No number is NaN or infinite, and no flag is set, at an ordinary input.
+    /// No number is NaN or infinite, and no flag is set, at an ordinary input. Near rest and near singularities, each
+    /// number is finite or flagged, or infinite because the true one is too large.
     Finite,
+    /// Where the formula has no value, the result is flagged.
+    Outside,
 }
 
 impl Check {
     /// Every check.
-    pub const ALL: [Self; 16] = [
+    pub const ALL: [Self; 17] = [
         Self::Accuracy,
         Self::DualNumbers,
         Self::FiniteDifferences,
@@ -60,6 +63,7 @@ impl Check {
         Self::MinusGradient,
         Self::Dissipation,
         Self::Finite,
+        Self::Outside,
     ];
 
     /// Returns the name of the check for people.
@@ -82,6 +86,7 @@ impl Check {
             Self::MinusGradient => "f = −∇U",
             Self::Dissipation => "damping dissipates",
             Self::Finite => "finite",
+            Self::Outside => "flagged outside",
         }
     }
 
@@ -97,7 +102,7 @@ impl Check {
             Self::OneSide => 1.0 / 3.0,
             Self::Continuity => 1e-8,
             Self::Claims => 1e-10,
-            Self::Symmetry | Self::Translation | Self::Units | Self::Finite => 0.0,
+            Self::Symmetry | Self::Translation | Self::Units | Self::Finite | Self::Outside => 0.0,
             Self::Routines => 1e-13,
             Self::LinearMomentum => 16.0 * f64::EPSILON / 2.0,
             Self::MinusGradient | Self::RestStability | Self::Dissipation => 1e-12,
@@ -205,6 +210,8 @@ pub struct MutationScore {
     /// Number of planted faults that change nothing at any input tried, not even in multi-precision, because ordinary
     /// inputs do not reach them.
     pub without_effect: usize,
+    /// Number of wanted faults that were not planted, because the budget of the element was spent.
+    pub left_out: usize,
 }
 
 impl MutationScore {
@@ -228,6 +235,41 @@ pub struct Spot {
     pub error: f64,
 }
 
+/// A loss of digits near rest or near a singularity, or a needless flag. It does not fail an audit.
+#[derive(Clone, Debug, Serialize)]
+pub struct Warning {
+    /// Name of the block.
+    pub block: BlockName,
+    /// The place, as in `near rest, at a strain of 9e-10`.
+    pub place: String,
+    /// Whether the block is flagged, although it has a limit.
+    pub is_flagged: bool,
+    /// Error in units of roundoff.
+    pub error: f64,
+    /// Error in units of roundoff times max(1, κ). Without a flag, it is more than 1000.
+    pub error_kappa: f64,
+    /// The subexpression that loses the digits; `None` if it was not found.
+    pub subexpression: Option<String>,
+    /// A spelling that keeps the digits, or where to look for one.
+    pub proposal: String,
+    /// The input.
+    pub input: Sample,
+}
+
+impl Warning {
+    /// Formats the warning on a few lines, without the input.
+    #[must_use]
+    pub fn describe(&self, element: &str) -> String {
+        let Self { block, place, is_flagged, error, error_kappa, subexpression, proposal, .. } = self;
+        let what = match is_flagged {
+            true => format!("block `{block}` is flagged {place}, although it has a limit there: error {error:.0e} u"),
+            false => format!("block `{block}` loses digits {place}: error {error:.0e} u, {error_kappa:.0e} u·κ"),
+        };
+        let culprit = subexpression.as_ref().map_or_else(String::new, |text| format!("\n  in `{text}`"));
+        format!("{element}: {what}{culprit}\n  {proposal}")
+    }
+}
+
 /// Data on the audit of one element, apart from its lines.
 #[derive(Clone, Debug, Serialize)]
 pub struct Section {
@@ -249,6 +291,14 @@ pub struct Section {
     pub curves: Vec<StepCurve>,
     /// Errors by configuration.
     pub spots: Vec<Spot>,
+    /// Number of inputs near rest and near singularities.
+    pub extremes: usize,
+    /// Losses of digits near rest and near singularities, one for each block and kind of place.
+    pub warnings: Vec<Warning>,
+    /// Number of random inputs that were replaced, because the formula has no value there.
+    pub outside: usize,
+    /// What the budget of the element left out; empty if nothing.
+    pub left_out: Vec<String>,
     /// Planted faults; `None` if the source of the element is not available.
     pub mutations: Option<MutationScore>,
 }
@@ -278,10 +328,30 @@ impl Report {
             let Section { element, without_differences: none, inputs, .. } = section;
             format!("{element}: no differences at {none} of {inputs} inputs, too near to a kink or a boundary.")
         });
-        let range = "Inputs outside of the sampled range (points ½ to 8 apart, parameters ½ to 2, or the domain that a \
-                     declaration states) were not looked at.";
-        let singular = "Inputs near rest or a singularity were not looked at; `verify stress` looks there.";
-        near_kinks.chain([range.to_owned(), singular.to_owned()]).collect()
+        let outside = self.sections.iter().filter(|section| section.outside > 0).map(|section| {
+            let Section { element, outside, .. } = section;
+            format!("{element}: {outside} random inputs were replaced, because the formula has no value there.")
+        });
+        let beyond_budget = self.sections.iter().filter(|section| !section.left_out.is_empty()).map(|section| {
+            let Section { element, left_out, .. } = section;
+            format!("{element}: left out to stay within the budget of operations: {}.", left_out.join(", "))
+        });
+        let range = "Ordinary inputs are points ½ to 8 apart with parameters ½ to 2, or the domain that a declaration \
+                     states; others were not looked at.";
+        let extremes: usize = self.sections.iter().map(|section| section.extremes).sum();
+        let singular = match extremes {
+            0 => "Inputs near rest or a singularity were not looked at; `verify stress` looks there.".to_owned(),
+            _ => format!(
+                "Near rest and near singularities, {extremes} inputs were looked at; `verify stress` goes closer, down \
+                 to 1e-300."
+            ),
+        };
+        near_kinks.chain(outside).chain(beyond_budget).chain([range.to_owned(), singular]).collect()
+    }
+
+    /// Returns the losses of digits near rest and near singularities, with their elements.
+    pub fn warnings(&self) -> impl Iterator<Item = (&'static str, &Warning)> {
+        self.sections.iter().flat_map(|section| section.warnings.iter().map(|warning| (section.element, warning)))
     }
 
     /// Returns the lines that failed.

@@ -1,7 +1,8 @@
 //! Comparison of the routes to each block: generated code, multi-precision, dual numbers, finite differences.
 
 use super::accuracy::{amplification, in_roundoffs};
-use super::auditor::{Auditor, Case, Finding};
+use super::auditor::{Auditor, Finding};
+use super::cases::Case;
 use super::entry::entry_name;
 use super::report::{Accuracy, Check, StepCurve};
 use crate::blocks::{Answer, Block, BlockName, NoAnswer, largest};
@@ -21,7 +22,7 @@ impl Auditor<'_> {
     /// Compares each block with all routes to it. Returns the errors of the differences against their steps.
     pub(super) fn routes(
         &mut self,
-        case: &Case,
+        case: &Case<'_>,
         answer: &Answer,
         accuracy: &mut Vec<Accuracy>,
     ) -> Result<Vec<StepCurve>, NoAnswer> {
@@ -41,7 +42,7 @@ impl Auditor<'_> {
 
     /// Returns the differences whose inputs are all on the side of the sample; `None` if no step is small enough for
     /// that, or if the block is not a derivative.
-    fn differences(&self, case: &Case, block: &Block) -> Result<Option<(BlockName, Sweep)>, NoAnswer> {
+    fn differences(&self, case: &Case<'_>, block: &Block) -> Result<Option<(BlockName, Sweep)>, NoAnswer> {
         let Some((lower, stepped)) = antiderivative(block.name, self.declaration.kind) else { return Ok(None) };
         let length = self.length(&case.sample, stepped);
         let here = self.subject.branches(&case.sample);
@@ -51,12 +52,21 @@ impl Auditor<'_> {
             length,
             &block.numbers,
             |moved| self.subject.lower_block(lower, moved),
-            |moved| here.is_empty() || self.subject.branches(moved) == here,
+            |moved| {
+                (here.is_empty() || self.subject.branches(moved) == here)
+                    && !(case.is_bounded && self.subject.is_outside(moved))
+            },
         )?;
         Ok(found.map(|found| (lower, found)))
     }
 
-    fn compare_all(&mut self, case: &Case, answer: &Answer, block: &Block, differences: Option<&(BlockName, Sweep)>) {
+    fn compare_all(
+        &mut self,
+        case: &Case<'_>,
+        answer: &Answer,
+        block: &Block,
+        differences: Option<&(BlockName, Sweep)>,
+    ) {
         let digits: Option<Vec<f64>> = case
             .truth(block.name)
             .filter(|t| t.is_defined)
@@ -120,7 +130,7 @@ impl Auditor<'_> {
     }
 
     /// Measures the error in units of roundoff, and divided by κ.
-    fn measure(&mut self, case: &Case, answer: &Answer, block: &Block, accuracy: &mut Vec<Accuracy>) {
+    fn measure(&mut self, case: &Case<'_>, answer: &Answer, block: &Block, accuracy: &mut Vec<Accuracy>) {
         let Some(truth) = case.truth(block.name).filter(|truth| truth.is_defined) else { return };
         let natural = self.natural_size(&case.sample, answer, block.name);
         let error = in_roundoffs(truth, &block.numbers, natural);

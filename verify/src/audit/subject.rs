@@ -3,9 +3,12 @@ use std::path::Path;
 use anyhow::Context;
 use energy_compiler::{Interpreted, Textbook};
 use energy_dsl::{AnyElement, Declaration, Inputs, Kind, Outputs, RestError};
+use fastrand::Rng;
 
+use super::budget::Meter;
 use super::report::Check;
-use crate::blocks::{Answer, BlockName, NoAnswer, evaluate};
+use crate::blocks::{Answer, BlockName, NoAnswer, evaluate, largest};
+use crate::formula::rows;
 use crate::sample::{Sample, Sampler};
 
 /// A function or closure that evaluates an element.
@@ -56,7 +59,15 @@ impl Target {
         self.declaration().name
     }
 
-    fn declaration(&self) -> &'static Declaration {
+    /// Returns the operations of all routines, which the time of an audit grows with.
+    #[must_use]
+    pub fn cost(&self) -> usize {
+        self.declaration().routines.iter().map(|routine| routine.full.total()).sum()
+    }
+
+    /// Returns the declaration of the element.
+    #[must_use]
+    pub fn declaration(&self) -> &'static Declaration {
         match &self.0 {
             Origin::Catalogue(entry) => entry.declaration,
             Origin::Text(element) => element.declaration(),
@@ -79,6 +90,17 @@ impl Target {
             Origin::Text(element) => Subject::of_routines(element, Some(element.as_ref().clone())),
         }
     }
+
+    /// Returns the element without the compiled routines that faults are planted in. This takes little time.
+    ///
+    /// # Errors
+    /// If the declaration does not compile.
+    pub fn subject_without_faults(&self) -> Result<Subject, String> {
+        match &self.0 {
+            Origin::Catalogue(entry) => Subject::new(entry.declaration, Box::new(entry.evaluate), None),
+            Origin::Text(element) => Subject::of_routines(element, None),
+        }
+    }
 }
 
 /// An element under audit.
@@ -93,6 +115,8 @@ pub struct Subject {
     pub interpreted: Option<Interpreted>,
     /// The routines that `evaluate` interprets, to run one of them alone; `None` if it runs generated code.
     routines: Option<Interpreted>,
+    /// Counts the operations of the audit.
+    pub(super) meter: Meter,
 }
 
 impl Subject {
@@ -106,7 +130,8 @@ impl Subject {
         interpreted: Option<Interpreted>,
     ) -> Result<Self, String> {
         let formula = Textbook::from_source(declaration.source).map_err(|errors| errors.to_string())?;
-        Ok(Self { declaration, evaluate, formula, interpreted, routines: None })
+        let meter = Meter::new(declaration);
+        Ok(Self { declaration, evaluate, formula, interpreted, routines: None, meter })
     }
 
     /// Creates the subject of an audit of interpreted routines.
@@ -134,6 +159,7 @@ impl Subject {
         };
         if let (Some(routines), Some((name, group))) = (&self.routines, routine) {
             let inputs = sample.inputs();
+            self.meter.answer(0);
             if let Some((mut groups, _)) = routines.routine(name, &inputs).map_err(NoAnswer::Rest)? {
                 return Ok(groups.swap_remove(group));
             }
@@ -146,7 +172,31 @@ impl Subject {
     /// # Errors
     /// If the rest shape is degenerate or a block has the wrong size.
     pub fn answer(&self, sample: &Sample) -> Result<Answer, NoAnswer> {
-        evaluate(self.declaration, &self.evaluate, &sample.inputs())
+        let answer = evaluate(self.declaration, &self.evaluate, &sample.inputs())?;
+        self.meter.answer(answer.flags.iter().filter(|flags| flags.degenerate).count());
+        Ok(answer)
+    }
+
+    /// Whether the formula has a value at an input, by doubles.
+    fn has_value(&self, sample: &Sample) -> bool {
+        self.meter.formula();
+        !rows(&self.formula, sample).iter().any(|row| row.is_nan())
+    }
+
+    /// Whether the formula has no value at an input and its surroundings: they are outside of its domain. At an input
+    /// where it is 0/0, it has values nearby.
+    pub(super) fn is_outside(&self, sample: &Sample) -> bool {
+        const NEARBY: f64 = 1.0 / (1 << 20) as f64;
+        if self.has_value(sample) {
+            return false;
+        }
+        let mut random = Rng::with_seed(1);
+        (0..3).all(|_| {
+            let mut moved = sample.clone();
+            let scale = largest(&sample.positions).max(f64::MIN_POSITIVE);
+            moved.positions.iter_mut().for_each(|x| *x += NEARBY * scale * (2.0 * random.f64() - 1.0));
+            !self.has_value(&moved)
+        })
     }
 
     /// Returns a sampler of the domain that the declaration states.
@@ -171,6 +221,7 @@ impl Subject {
     /// that take different ones.
     #[must_use]
     pub fn branches(&self, sample: &Sample) -> Vec<bool> {
+        self.meter.formula();
         self.formula.branches(&sample.inputs())
     }
 

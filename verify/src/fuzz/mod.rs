@@ -130,7 +130,7 @@ impl<F: Fn(&str) -> String> Fuzzer<'_, F> {
             Ok(outcome) => return Ok(self.outcomes.insert(hash(&without_names(outcome)))),
         };
         let kept = self.corpus.join(format!("found-{:016x}", hash(input)));
-        energy_cli::write_file(&kept, input)?;
+        std::fs::write(&kept, input).with_context(|| format!("cannot write {}", kept.display()))?;
         Err(Finding { why, input: kept }.into())
     }
 }

@@ -12,7 +12,7 @@ thread_local! {
 }
 
 /// Runs `work` with this precision of new numbers.
-pub(super) fn with_precision<R>(bits: usize, work: impl FnOnce() -> R) -> R {
+pub(crate) fn with_precision<R>(bits: usize, work: impl FnOnce() -> R) -> R {
     struct Restore(usize);
     impl Drop for Restore {
         fn drop(&mut self) {

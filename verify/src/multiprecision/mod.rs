@@ -15,11 +15,12 @@ mod rug;
 mod truth;
 
 pub use big::Big;
+pub(crate) use big::with_precision as at_precision;
 #[cfg(not(feature = "rug"))]
 use dashu::Float;
 #[cfg(feature = "rug")]
 use rug::Float;
 
-pub(crate) use truth::truth_of_ordinary;
 pub use truth::worse;
 pub use truth::{TrueBlock, truth};
+pub(crate) use truth::{Truth, truth_of_extreme, truth_of_ordinary};

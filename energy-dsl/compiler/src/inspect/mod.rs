@@ -6,6 +6,7 @@ mod layout;
 mod listing;
 mod mathml;
 mod mutation;
+mod parts;
 mod textbook;
 mod tower;
 
@@ -15,5 +16,6 @@ pub use listing::{Listing, Path};
 pub use mathml::mathml;
 pub(crate) use mutation::faults;
 pub use mutation::{Fault, Mutation};
+pub use parts::{Part, Parts};
 pub use textbook::Textbook;
 pub(crate) use textbook::{file_programs, programs};

@@ -3,6 +3,7 @@ use proc_macro2::TokenStream;
 use crate::check::{Program, Source, check};
 use crate::diagnostic::{Diagnostic, Diagnostics, Span};
 use crate::graph::{Interpreter, NodeId};
+use crate::inspect::parts::Parts;
 use crate::inspect::tower::Tower;
 use crate::lower::{TextbookFormula, lower_textbook};
 use crate::syntax::{parse, parse_file};
@@ -63,6 +64,12 @@ impl Textbook {
     #[must_use]
     pub fn program(&self) -> &Program {
         &self.program
+    }
+
+    /// Returns the subexpressions of the formula; `None` if it contains derivatives or is too large.
+    #[must_use]
+    pub fn parts(&self) -> Option<Parts> {
+        Parts::of(&self.program)
     }
 
     /// Evaluates the formula, row by row: U; C; the forces, three numbers per point; or r. The stiffness and damping of

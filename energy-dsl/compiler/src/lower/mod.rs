@@ -1,9 +1,11 @@
 //! Lowers typed programs to scalar graphs.
 
+mod parts;
 mod repeated;
 mod rest;
 mod spectral;
 
+pub use parts::{LoweredPart, lower_parts};
 pub use repeated::Repetition;
 
 use std::collections::{BTreeMap, BTreeSet};

@@ -6,11 +6,11 @@ use energy_elements::{
     NeoHookean, StVK, StableNeoHookeanLog,
 };
 
-use super::methods::{Measured, Methods};
-use verify::dual::Hyper;
 use verify::sample::Sample;
 
 use super::complex::Complex;
+use super::methods::{Measured, Methods};
+use super::plain;
 
 /// A function that measures an element by all methods.
 pub(super) type Bench = fn(&Methods<'_>) -> Vec<Measured>;
@@ -27,8 +27,9 @@ fn space<T: Real>(rest: &[T], point: usize) -> Vector3<T> {
     [rest[3 * point], rest[3 * point + 1], rest[3 * point + 2]]
 }
 
+/// Declares the elements with their plain formula, their number of coordinates, and how they are made.
 macro_rules! benches {
-    ($($element:ident, |$parameters:ident, $rest:ident| $make:expr;)*) => {
+    ($($element:ident by $plain:ident of $coordinates:literal, |$parameters:ident, $rest:ident| $make:expr;)*) => {
         /// Benchmarks by the name of their element.
         pub(super) const ELEMENTS: &[(&str, Bench)] = &[$((stringify!($element), |methods| {
             fn make<T: Real>(sample: &Sample) -> $element<T> {
@@ -37,7 +38,8 @@ macro_rules! benches {
                 let _ = &$parameters;
                 $make
             }
-            methods.all(&make::<f64>, &make::<f32>, &make::<Complex>, &make::<Hyper>)
+            let dual = |sample: &Sample| plain::hessian::<$coordinates>(plain::$plain, sample);
+            methods.all(&make::<f64>, &make::<f32>, &make::<Complex>, &dual)
         })),*];
     };
 }
@@ -45,17 +47,17 @@ macro_rules! benches {
 const POSITIVE: &str = "samples have rest shapes of positive area";
 
 benches! {
-    Distance, |p, r| Distance::new();
-    HookeSpring, |p, r| HookeSpring::new(p[0], p[1]);
-    DistanceBarrier, |p, r| DistanceBarrier::new(p[0], p[1]);
-    HairBend, |p, r| HairBend::new(p[0]);
-    HingeAngle, |p, r| HingeAngle::new();
-    BridsonBending, |p, r| BridsonBending::new(p[0], p[1]);
-    FlatBending, |p, r| FlatBending::new(space(&r, 0), space(&r, 1), space(&r, 2), space(&r, 3), p[0]).expect(POSITIVE);
-    StVK, |p, r| StVK::new(plane(&r, 0), plane(&r, 1), plane(&r, 2), p[0], p[1]).expect(POSITIVE);
-    AsRigidAsPossible, |p, r| AsRigidAsPossible::new(plane(&r, 0), plane(&r, 1), plane(&r, 2), p[0]).expect(POSITIVE);
-    StableNeoHookeanLog, |p, r| {
+    Distance by distance of 6, |p, r| Distance::new();
+    HookeSpring by spring of 6, |p, r| HookeSpring::new(p[0], p[1]);
+    DistanceBarrier by barrier of 6, |p, r| DistanceBarrier::new(p[0], p[1]);
+    HairBend by hair_bend of 9, |p, r| HairBend::new(p[0]);
+    HingeAngle by dihedral of 12, |p, r| HingeAngle::new();
+    BridsonBending by bridson of 12, |p, r| BridsonBending::new(p[0], p[1]);
+    FlatBending by flat_bending of 12, |p, r| FlatBending::new(space(&r, 0), space(&r, 1), space(&r, 2), space(&r, 3), p[0]).expect(POSITIVE);
+    StVK by stvk of 9, |p, r| StVK::new(plane(&r, 0), plane(&r, 1), plane(&r, 2), p[0], p[1]).expect(POSITIVE);
+    AsRigidAsPossible by arap of 9, |p, r| AsRigidAsPossible::new(plane(&r, 0), plane(&r, 1), plane(&r, 2), p[0]).expect(POSITIVE);
+    StableNeoHookeanLog by stable_neo_hookean_log of 9, |p, r| {
         StableNeoHookeanLog::new(plane(&r, 0), plane(&r, 1), plane(&r, 2), p[0], p[1]).expect(POSITIVE)
     };
-    NeoHookean, |p, r| NeoHookean::new(plane(&r, 0), plane(&r, 1), plane(&r, 2), p[0], p[1]).expect(POSITIVE);
+    NeoHookean by neo_hookean of 9, |p, r| NeoHookean::new(plane(&r, 0), plane(&r, 1), plane(&r, 2), p[0], p[1]).expect(POSITIVE);
 }

@@ -1,10 +1,11 @@
-//! The methods of computing an element's Hessian. All but multi-precision run the same generated code.
+//! The methods of computing an element's Hessian. Each is in its best form: differences at their best step, num-dual on
+//! the plain formula with all derivatives at once. The others run the same generated code.
 
 use std::cell::RefCell;
 use std::hint::black_box;
 use std::time::{Duration, Instant};
 
-use energy_compiler::{InputKind, InputNumbers};
+use energy_compiler::{Elements, InputKind, InputNumbers};
 use energy_dsl::tape::Column;
 use energy_dsl::{
     Array, Batch, BatchWork, Block, Level, Packed, PackedPotential, Potential, Real, Vector3, for_each_batch,
@@ -15,14 +16,15 @@ use serde::Serialize;
 use super::complex::Complex;
 use verify::audit::Subject;
 use verify::blocks::BlockName;
-use verify::dual::Hyper;
 use verify::formula::expected_blocks;
 use verify::geometry::longest_distance;
 use verify::multiprecision::{TrueBlock, truth, worse};
 use verify::sample::Sample;
 
-/// Digits of the reference value.
+/// Digits of the method multi-precision.
 const DIGITS: usize = 30;
+/// Digits of the reference value, with which all methods are compared.
+const REFERENCE_DIGITS: usize = 60;
 /// Elements in a batch over SIMD lanes.
 const MANY: usize = 1024;
 
@@ -50,43 +52,39 @@ type Make<'a, E> = &'a dyn Fn(&Sample) -> E;
 
 impl<'a> Methods<'a> {
     pub(super) fn new(subject: &'a Subject, samples: &'a [Sample]) -> Self {
-        let truths = samples.iter().map(|sample| hessian(subject, sample)).collect();
+        let truths = samples.iter().map(|sample| hessian(subject, sample, REFERENCE_DIGITS)).collect();
         Self { subject, samples, truths }
     }
 
     /// Measures every method, from the least to the most exact.
-    pub(super) fn all<D, S, C, H>(
+    pub(super) fn all<D, S, C>(
         &self,
         double: Make<'_, D>,
         single: Make<'_, S>,
         complex: Make<'_, C>,
-        hyper: Make<'_, H>,
+        dual: &dyn Fn(&Sample) -> Vec<f64>,
     ) -> Vec<Measured>
     where
         D: PackedPotential<f64>,
         S: Potential<f32>,
         C: Potential<Complex>,
-        H: Potential<Hyper>,
     {
         let doubles: Vec<(D, D::Points)> = self.samples.iter().map(|s| (double(s), points(s))).collect();
         let singles: Vec<(S, S::Points)> = self.samples.iter().map(|s| (single(s), points(s))).collect();
         let complexes: Vec<(C, C::Points)> = self.samples.iter().map(|s| (complex(s), points(s))).collect();
-        let hypers: Vec<(H, H::Points)> = self.samples.iter().map(|s| (hyper(s), points(s))).collect();
         let sizes: Vec<f64> = self.samples.iter().map(|s| longest_distance(&s.positions).unwrap_or(1.0)).collect();
-        let differences = |method, stencil: &[(f64, f64)], exponent: f64| {
-            let step = |i: usize| sizes[i] * f64::EPSILON.powf(exponent);
-            self.measure(method, |i| by_differences(&doubles[i], stencil, step(i)))
+        let differences = |method, stencil: &[(f64, f64)]| {
+            self.at_best_step(method, |i, step| by_differences(&doubles[i], stencil, step * sizes[i]))
         };
         let mut list = vec![
-            differences("forward differences", &[(0.0, -1.0), (1.0, 1.0)], 0.5),
-            differences("central differences", &[(-1.0, -0.5), (1.0, 0.5)], 1.0 / 3.0),
+            differences("forward differences", &[(0.0, -1.0), (1.0, 1.0)]),
+            differences("central differences", &[(-1.0, -0.5), (1.0, 0.5)]),
             differences(
                 "Richardson's differences",
                 &[(-2.0, 1.0 / 12.0), (-1.0, -2.0 / 3.0), (1.0, 2.0 / 3.0), (2.0, -1.0 / 12.0)],
-                0.2,
             ),
             self.measure("complex step", |i| by_complex_step(&complexes[i])),
-            self.measure("num-dual", |i| by_hyper_dual(&hypers[i])),
+            self.measure("num-dual", |i| dual(&self.samples[i])),
         ];
         let timed = self.time(|i| discard(singles[i].0.hessian(black_box(&singles[i].1)).hessian));
         let error = self.error(|i| full(singles[i].0.hessian(&singles[i].1).hessian.as_ref(), f64::from));
@@ -94,10 +92,10 @@ impl<'a> Methods<'a> {
         let timed = self.time(|i| discard(doubles[i].0.hessian(black_box(&doubles[i].1)).hessian));
         let error = self.error(|i| full(doubles[i].0.hessian(&doubles[i].1).hessian.as_ref(), |x| x));
         list.push(self.measured("generated, f64", timed, error));
-        // Lanes have the bits of the scalar if products and sums fuse in both.
-        list.push(self.measured("generated, f64 lanes", time_lanes(&doubles), error));
-        let timed = self.time(|i| discard(hessian(self.subject, &self.samples[i])));
-        list.push(self.measured("multi-precision, 30 digits", timed, 1e-30));
+        let lanes = Lanes::new(&doubles);
+        let error = self.error(|i| full(&lanes.triangle(i), |x| x));
+        list.push(self.measured("generated, f64 lanes", lanes.time(), error));
+        list.push(self.multiprecision());
         list
     }
 
@@ -111,8 +109,8 @@ impl<'a> Methods<'a> {
             let answer = subject.answer(sample).expect("it has an answer at this input");
             answer.block(name).numbers.clone()
         };
-        let central = |i: usize| {
-            let h = longest_distance(&samples[i].positions).unwrap_or(1.0) * f64::EPSILON.powf(1.0 / 3.0);
+        let central = |i: usize, step: f64| {
+            let h = longest_distance(&samples[i].positions).unwrap_or(1.0) * step;
             let n = samples[i].positions.len();
             let mut matrix = vec![0.0; n * n];
             for column in 0..n {
@@ -132,16 +130,32 @@ impl<'a> Methods<'a> {
             let hessian = blocks.into_iter().find(|block| block.name == BlockName::Hessian);
             hessian.expect("energies have Hessians").numbers
         };
-        let timed = self.time(|i| discard(hessian(subject, &samples[i])));
-        // Lanes have the bits of single elements.
-        let error = self.error(|i| block(&samples[i], BlockName::Hessian));
+        let tape = TapeLanes::new(subject, samples)?;
+        let error = self.error(|i| tape.hessian(i));
         Ok(vec![
-            self.measure("central differences, interpreted", central),
+            self.at_best_step("central differences, interpreted", central),
             self.measure("dual numbers, interpreted", dual),
             self.measure("tape, one element at a time", |i| block(&samples[i], BlockName::Hessian)),
-            self.measured("tape, f64 lanes", time_tape(subject, samples)?, error),
-            self.measured("multi-precision, 30 digits", timed, 1e-30),
+            self.measured("tape, f64 lanes", tape.time(), error),
+            self.multiprecision(),
         ])
+    }
+
+    /// Measures multi-precision, whose error doubles cannot hold.
+    fn multiprecision(&self) -> Measured {
+        let found = |i: usize| hessian(self.subject, &self.samples[i], DIGITS);
+        let of = |(i, truth): (usize, &TrueBlock)| truth.relative_difference(&found(i));
+        let error = self.truths.iter().enumerate().map(of).fold(0.0, worse);
+        self.measured("multi-precision, 30 digits", self.time(|i| discard(found(i))), error)
+    }
+
+    /// Measures differences at the step, relative to the size of the element, whose largest error is least.
+    fn at_best_step(&self, method: &'static str, run: impl Fn(usize, f64) -> Vec<f64>) -> Measured {
+        let steps = (2..=40).map(|k| f64::from(-k).exp2());
+        let errors = steps.map(|step| (step, self.error(|i| run(i, step))));
+        let least = errors.filter(|(_, error)| !error.is_nan()).min_by(|a, b| a.1.total_cmp(&b.1));
+        let (step, error) = least.unwrap_or((f64::EPSILON.cbrt(), f64::NAN));
+        self.measured(method, self.time(|i| discard(run(i, step))), error)
     }
 
     fn measured(&self, method: &'static str, nanoseconds: f64, error: f64) -> Measured {
@@ -194,8 +208,8 @@ fn least(count: usize, round: impl Fn()) -> f64 {
     best
 }
 
-fn hessian(subject: &Subject, sample: &Sample) -> TrueBlock {
-    let blocks = truth(subject.declaration, &subject.formula, sample, DIGITS);
+fn hessian(subject: &Subject, sample: &Sample, digits: usize) -> TrueBlock {
+    let blocks = truth(subject.declaration, &subject.formula, sample, digits);
     blocks.into_iter().find(|truth| truth.block.name == BlockName::Hessian).expect("energies have Hessians")
 }
 
@@ -248,24 +262,6 @@ fn by_complex_step<E: Potential<Complex>>((element, x): &(E, E::Points)) -> Vec<
     matrix
 }
 
-/// Evaluates one hyper-dual value per pair of coordinates.
-fn by_hyper_dual<E: Potential<Hyper>>((element, x): &(E, E::Points)) -> Vec<f64> {
-    let n = 3 * E::Points::LEN;
-    let mut matrix = vec![0.0; n * n];
-    for row in 0..n {
-        for column in row..n {
-            let mut moved = *x;
-            for i in [row, column] {
-                let coordinate = &mut moved.as_mut()[i / 3][i % 3];
-                *coordinate = Hyper::variable(coordinate.0.re, i == row, i == column);
-            }
-            let entry = element.value(&moved).value.0.eps1eps2;
-            (matrix[row * n + column], matrix[column * n + row]) = (entry, entry);
-        }
-    }
-    matrix
-}
-
 /// Computes batches of Hessians and discards them.
 struct Discarded;
 
@@ -276,35 +272,90 @@ impl<E: PackedPotential<f64>> BatchWork<E> for Discarded {
     }
 }
 
-fn time_lanes<E: PackedPotential<f64>>(elements: &[(E, E::Points)]) -> f64 {
-    let n = E::Points::LEN;
-    let own = |element: usize| &elements[element % elements.len()];
-    let packed = Packed::from_fn(MANY, n, |element| &own(element).0, |element, point| (n * element + point) as u32);
-    let positions: Vec<Vector3<f64>> = (0..MANY).flat_map(|element| own(element).1.as_ref().to_vec()).collect();
-    least(MANY, || for_each_batch(black_box(&packed), &positions, &mut Discarded))
+/// A batch of elements over SIMD lanes, which repeats some of them.
+struct Lanes<E: PackedPotential<f64>> {
+    packed: Packed<E>,
+    positions: Vec<Vector3<f64>>,
+    different: usize,
 }
 
-/// Returns the nanoseconds per Hessian of a declaration that was read, in blocks of elements.
-fn time_tape(subject: &Subject, samples: &[Sample]) -> Result<f64, String> {
-    let element = subject.interpreted.as_ref().ok_or("this declaration was not read at run time")?;
-    let own = |number: usize| &samples[number % samples.len()];
-    let columns = |kind: InputKind, numbers: fn(&Sample) -> &[f64]| {
-        let mut first = 0;
-        let column = |input: &InputNumbers| {
-            first += input.size();
-            (0..MANY).flat_map(|i| numbers(own(i))[first - input.size()..first].to_vec()).collect::<Vec<f64>>()
+impl<E: PackedPotential<f64>> Lanes<E> {
+    fn new(elements: &[(E, E::Points)]) -> Self {
+        let n = E::Points::LEN;
+        let own = |element: usize| &elements[element % elements.len()];
+        let packed = Packed::from_fn(MANY, n, |element| &own(element).0, |element, point| (n * element + point) as u32);
+        let positions = (0..MANY).flat_map(|element| own(element).1.as_ref().to_vec()).collect();
+        Self { packed, positions, different: elements.len() }
+    }
+
+    /// Returns the nanoseconds per element.
+    fn time(&self) -> f64 {
+        least(MANY, || for_each_batch(black_box(&self.packed), &self.positions, &mut Discarded))
+    }
+
+    /// Returns the Hessian of one of the different elements, from its last copy in the batch.
+    fn triangle(&self, element: usize) -> Vec<Block<f64>> {
+        let (n, blocks) = (3 * E::Points::LEN, <E::Triangle as Array<Block<f64>>>::LEN);
+        let mut energies = vec![0.0; MANY];
+        let mut gradients = vec![0.0; MANY * n];
+        let mut triangles = vec![[[0.0; 3]; 3]; MANY * blocks];
+        let numbers = triangles.as_flattened_mut().as_flattened_mut();
+        let done = self.packed.hessians(0..MANY, &self.positions, &mut energies, &mut gradients, numbers);
+        done.expect("the slices fit the range");
+        let of = |number: usize| &triangles[number * blocks..(number + 1) * blocks];
+        let last = (element..MANY).step_by(self.different).next_back().unwrap_or(element);
+        of(last).to_vec()
+    }
+}
+
+/// A batch of elements of a declaration that was read, evaluated in blocks.
+struct TapeLanes {
+    elements: Elements<f64>,
+    positions: Vec<f64>,
+    coordinates: usize,
+}
+
+impl TapeLanes {
+    fn new(subject: &Subject, samples: &[Sample]) -> Result<Self, String> {
+        let element = subject.interpreted.as_ref().ok_or("this declaration was not read at run time")?;
+        let own = |number: usize| &samples[number % samples.len()];
+        let columns = |kind: InputKind, numbers: fn(&Sample) -> &[f64]| {
+            let mut first = 0;
+            let column = |input: &InputNumbers| {
+                first += input.size();
+                (0..MANY).flat_map(|i| numbers(own(i))[first - input.size()..first].to_vec()).collect::<Vec<f64>>()
+            };
+            element.inputs().iter().filter(|input| input.kind == kind).map(column).collect::<Vec<_>>()
         };
-        element.inputs().iter().filter(|input| input.kind == kind).map(column).collect::<Vec<_>>()
-    };
-    let (rest, parameters) = (columns(InputKind::Rest, |s| &s.rest), columns(InputKind::Parameter, |s| &s.parameters));
-    let [rest, parameters] =
-        [&rest, &parameters].map(|list| list.iter().map(|numbers| Column::Each(numbers)).collect::<Vec<_>>());
-    let elements = element.elements(MANY, &rest, &parameters).map_err(|error| error.to_string())?;
-    let x: Vec<f64> = (0..MANY).flat_map(|i| own(i).positions.clone()).collect();
-    let n = element.coordinates();
-    let outputs = RefCell::new((vec![0.0; MANY], vec![0.0; MANY * n], vec![0.0; MANY * n * n]));
-    Ok(least(MANY, || {
-        let (energies, gradients, hessians) = &mut *outputs.borrow_mut();
-        discard(elements.hessians(0..MANY, black_box(&x), energies, gradients, hessians));
-    }))
+        let rest = columns(InputKind::Rest, |s| &s.rest);
+        let parameters = columns(InputKind::Parameter, |s| &s.parameters);
+        let [rest, parameters] =
+            [&rest, &parameters].map(|list| list.iter().map(|numbers| Column::Each(numbers)).collect::<Vec<_>>());
+        let elements = element.elements(MANY, &rest, &parameters).map_err(|error| error.to_string())?;
+        let positions = (0..MANY).flat_map(|i| own(i).positions.clone()).collect();
+        Ok(Self { elements, positions, coordinates: element.coordinates() })
+    }
+
+    fn outputs(&self) -> [Vec<f64>; 3] {
+        let n = self.coordinates;
+        [vec![0.0; MANY], vec![0.0; MANY * n], vec![0.0; MANY * n * n]]
+    }
+
+    /// Returns the nanoseconds per element.
+    fn time(&self) -> f64 {
+        let outputs = RefCell::new(self.outputs());
+        least(MANY, || {
+            let [energies, gradients, hessians] = &mut *outputs.borrow_mut();
+            discard(self.elements.hessians(0..MANY, black_box(&self.positions), energies, gradients, hessians));
+        })
+    }
+
+    /// Returns the Hessian of an element.
+    fn hessian(&self, element: usize) -> Vec<f64> {
+        let [mut energies, mut gradients, mut hessians] = self.outputs();
+        let done = self.elements.hessians(0..MANY, &self.positions, &mut energies, &mut gradients, &mut hessians);
+        done.expect("the slices fit the range");
+        let size = self.coordinates * self.coordinates;
+        hessians[element * size..(element + 1) * size].to_vec()
+    }
 }

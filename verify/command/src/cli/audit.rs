@@ -1,3 +1,4 @@
+use std::num::NonZero;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
@@ -8,7 +9,8 @@ use super::output::{table, write_json, write_text};
 use super::targets::{energy_target, targets};
 
 /// Compares every derivative with multi-precision, dual numbers and finite differences, checks the laws that it must
-/// obey, and plants faults that must be noticed. Exit status 1 on any failure.
+/// obey, and plants faults that must be noticed. Looks near rest and near singularities, and warns where digits are
+/// lost. Exit status 1 on any failure, 0 with warnings.
 #[derive(Args)]
 pub struct Audit {
     /// Elements of the catalogue or of the file [default: all].
@@ -28,6 +30,9 @@ pub struct Audit {
     /// Use a few samples and faults only.
     #[arg(long, conflicts_with_all = ["samples", "faults"])]
     quick: bool,
+    /// Threads; the report does not depend on their number [default: all processors].
+    #[arg(long)]
+    threads: Option<NonZero<usize>>,
     /// Also check that the audited forces are minus the gradient of this energy, from the file or the catalogue.
     #[arg(long, value_name = "ENERGY")]
     against: Option<String>,
@@ -56,11 +61,11 @@ struct Written<'a> {
 
 impl Audit {
     pub fn run(self) -> anyhow::Result<bool> {
-        let Self { samples, seed, faults, .. } = self;
+        let Self { samples, seed, faults, threads, .. } = self;
         let options = match (self.quick, samples) {
-            (true, _) => Options { seed, ..Options::quick() },
-            (false, None) => Options { declared_samples: true, seed, mutations: faults, ..Options::default() },
-            (false, Some(samples)) => Options { samples, seed, mutations: faults, ..Options::default() },
+            (true, _) => Options { seed, threads, ..Options::quick() },
+            (false, None) => Options { declared_samples: true, seed, mutations: faults, threads, ..Options::default() },
+            (false, Some(samples)) => Options { samples, seed, mutations: faults, threads, ..Options::default() },
         };
         let file = self.file.as_deref();
         let targets = targets(&self.names, file)?;
@@ -71,7 +76,7 @@ impl Audit {
         };
         print(&report);
         write_json(self.json.as_deref(), &Written { report: &report, not_looked_at: report.blind_spots() })?;
-        write_text(self.html.as_deref(), || verify::audit::html(&report))?;
+        write_text(self.html.as_deref(), || verify_command::audit_page(&report))?;
         write_text(self.junit.as_deref(), || verify::audit::junit(&report))?;
         Ok(report.passed())
     }
@@ -79,7 +84,7 @@ impl Audit {
 
 /// Runs all checks at the inputs of a file. An input that names no element is for the only target.
 fn audit_at_inputs(targets: &[Target], energy: Option<&Target>, file: &Path) -> anyhow::Result<Report> {
-    let inputs = verify::audit::read_inputs(file)?;
+    let inputs = verify_command::read_inputs(file)?;
     let mut report = Report::default();
     for (element, sample) in &inputs {
         let chosen: Vec<&Target> = match element {
@@ -119,16 +124,20 @@ fn print(report: &Report) {
     for (name, why) in &report.refused {
         println!("\n{name} cannot be audited: {why}");
     }
+    for (element, warning) in report.warnings() {
+        println!("\nwarning: {}", warning.describe(element));
+    }
     for (element, mutant) in report.missed() {
         println!("\n{element}: no check noticed a planted fault: {}", mutant.fault);
     }
     print_mutation_scores(report);
     println!("\n{}", report.blind_spots().join("\n"));
     println!(
-        "\n{} elements, {} checks, {} failed",
+        "\n{} elements, {} checks, {} failed, {} warnings",
         report.elements(),
         report.lines.len(),
-        report.failures().count() + report.refused.len() + report.missed().count()
+        report.failures().count() + report.refused.len() + report.missed().count(),
+        report.warnings().count()
     );
 }
 

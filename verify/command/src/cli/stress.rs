@@ -1,3 +1,4 @@
+use std::num::NonZero;
 use std::path::PathBuf;
 
 use clap::Args;
@@ -18,6 +19,9 @@ pub struct Stress {
     /// Sweep the declarations of this file (`.energy`) instead of the catalogue's, without degenerate inputs.
     #[arg(long)]
     file: Option<PathBuf>,
+    /// Threads; results do not depend on their number [default: all processors].
+    #[arg(long)]
+    threads: Option<NonZero<usize>>,
     /// Also write `stress.md`, `stress.json` and a plot of each sweep to this folder.
     #[arg(short, long)]
     output: Option<PathBuf>,
@@ -25,10 +29,8 @@ pub struct Stress {
 
 impl Stress {
     pub fn run(self) -> anyhow::Result<bool> {
-        let mut tracks = Vec::new();
-        for target in targets(&self.names, self.file.as_deref())? {
-            tracks.extend(stress(&target).map_err(anyhow::Error::msg)?);
-        }
+        let targets = targets(&self.names, self.file.as_deref())?;
+        let tracks = stress(&targets, self.threads).map_err(anyhow::Error::msg)?;
         let table = markdown(&tracks);
         print!("{table}");
         if let Some(folder) = self.output {

@@ -8,7 +8,7 @@ use serde_json::{Map, Value, json};
 use super::file::{Record, RecordError, read};
 use super::fusion::{evaluate_fusion, family_names};
 use super::mapping::{is_undeclared, mapping};
-use verify::audit::{Subject, Target, read_inputs};
+use verify::audit::{Subject, Target};
 use verify::blocks::{Answer, NoAnswer, evaluate};
 use verify::multiprecision::{TrueBlock, truth};
 use verify::sample::Sample;
@@ -121,7 +121,7 @@ pub fn evaluate_inputs(targets: &[Target], inputs: &Path, output: &Path, source:
     let subjects: Vec<Subject> =
         targets.iter().map(|target| target.subject().map_err(anyhow::Error::msg)).collect::<Result<_, _>>()?;
     let mut records = Vec::new();
-    for (name, sample) in read_inputs(inputs)? {
+    for (name, sample) in crate::read_inputs(inputs)? {
         let found = match &name {
             Some(name) => subjects.iter().find(|subject| subject.declaration.name == name),
             None => subjects.first().filter(|_| subjects.len() == 1),

@@ -6,12 +6,15 @@ mod sweeps;
 pub use report::{markdown, plots};
 pub use sweeps::{Sweep, sweeps};
 
+use std::num::NonZero;
+
 use serde::Serialize;
 
 use verify::audit::{Subject, Target, amplification};
 use verify::blocks::BlockName;
 use verify::formula::expected_blocks;
 use verify::multiprecision::truth;
+use verify::parallel;
 use verify::sample::Sample;
 
 /// Errors of one block at one point of a sweep, in units of roundoff of its largest number.
@@ -65,26 +68,34 @@ impl Track {
     }
 }
 
-/// Runs every sweep that fits an element.
+/// Runs every sweep that fits each element. `None` uses all processors; the result does not depend on the number of
+/// threads.
 ///
 /// # Errors
-/// If the element cannot be read.
-pub fn stress(target: &Target) -> Result<Vec<Track>, String> {
-    let subject = target.subject()?;
-    let mut tracks = Vec::new();
-    for Sweep { name, inputs } in sweeps(subject.declaration) {
-        let mut own: Vec<Track> = Vec::new();
-        for (parameter, sample) in inputs {
-            for (block, point) in at(&subject, &sample, parameter) {
-                match own.iter_mut().find(|track| track.block == block) {
-                    Some(track) => track.points.push(point),
-                    None => {
-                        own.push(Track { element: subject.declaration.name, sweep: name, block, points: vec![point] })
-                    }
+/// If an element cannot be read.
+pub fn stress(targets: &[Target], threads: Option<NonZero<usize>>) -> Result<Vec<Track>, String> {
+    // Threads share sweeps rather than elements: a single element may take a third of the time of all.
+    let pairs = targets.iter().flat_map(|target| sweeps(target.declaration()).into_iter().map(move |s| (target, s)));
+    let pairs: Vec<(&Target, Sweep)> = pairs.collect();
+    let cost = |(target, sweep): &(&Target, Sweep)| target.cost() * sweep.inputs.len();
+    let tracks: Result<Vec<_>, _> =
+        parallel::map(&pairs, threads, cost, |(target, sweep)| run(target, sweep)).into_iter().collect();
+    tracks.map(|tracks| tracks.concat())
+}
+
+/// Runs one sweep of an element.
+fn run(target: &Target, Sweep { name, inputs }: &Sweep) -> Result<Vec<Track>, String> {
+    let subject = target.subject_without_faults()?;
+    let mut tracks: Vec<Track> = Vec::new();
+    for (parameter, sample) in inputs {
+        for (block, point) in at(&subject, sample, *parameter) {
+            match tracks.iter_mut().find(|track| track.block == block) {
+                Some(track) => track.points.push(point),
+                None => {
+                    tracks.push(Track { element: subject.declaration.name, sweep: name, block, points: vec![point] })
                 }
             }
         }
-        tracks.extend(own);
     }
     Ok(tracks)
 }

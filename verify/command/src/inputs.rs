@@ -1,9 +1,11 @@
+//! Inputs in JSON files.
+
 use std::path::Path;
 
 use anyhow::Context;
 use serde_json::Value;
 
-use crate::sample::Sample;
+use verify::sample::Sample;
 
 /// Reads the inputs of a file: one object, a list of objects, or the inputs in a report. Returns each with the name of
 /// its element, if the file names it.

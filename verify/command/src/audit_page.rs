@@ -1,15 +1,17 @@
+//! The report of an audit as a web page.
+
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
 use energy_cli::plot::{Curve, logarithmic};
 
-use super::report::{Check, Report, Section, describe_failure};
-use crate::blocks::BlockName;
+use verify::audit::{Accuracy, Check, Report, Section, describe_failure, escaped};
+use verify::blocks::BlockName;
 
 /// Formats the report as a self-contained page: formulas, tables, errors of differences against their step, errors by
 /// configuration, planted faults.
 #[must_use]
-pub fn html(report: &Report) -> String {
+pub fn audit_page(report: &Report) -> String {
     let mut page = String::from(
         "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>Audit</title>\n<style>\n\
          body{font:15px/1.45 system-ui,sans-serif;max-width:72rem;margin:2rem auto;padding:0 1rem;color:#222}\n\
@@ -33,11 +35,6 @@ pub fn html(report: &Report) -> String {
     page
 }
 
-/// Escapes the characters that markup reserves.
-pub(super) fn escaped(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
-}
-
 fn overview(page: &mut String, report: &Report) {
     let failed = report.failures().count() + report.refused.len() + report.missed().count();
     let class = if failed == 0 { "ok" } else { "failed" };
@@ -50,7 +47,7 @@ fn overview(page: &mut String, report: &Report) {
         report.lines.len(),
     );
     for section in &report.sections {
-        let worst = |pick: fn(&super::report::Accuracy) -> f64| section.accuracy.iter().map(pick).fold(0.0, f64::max);
+        let worst = |pick: fn(&Accuracy) -> f64| section.accuracy.iter().map(pick).fold(0.0, f64::max);
         let faults =
             section.mutations.as_ref().map_or("–".into(), |m| format!("{} of {}", m.caught(), m.mutants.len()));
         let passed = report.lines.iter().filter(|l| l.element == section.element).all(|l| l.passed);
@@ -87,6 +84,9 @@ fn element(page: &mut String, report: &Report, section: &Section) {
     }
     for line in report.failures().filter(|line| line.element == section.element) {
         let _ = writeln!(page, "<pre class=\"failed\">{}</pre>", escaped(&describe_failure(line)));
+    }
+    for warning in &section.warnings {
+        let _ = writeln!(page, "<pre>warning: {}</pre>", escaped(&warning.describe(section.element)));
     }
     accuracy(page, section);
     checks(page, report, section);
