@@ -3,6 +3,7 @@
 
 mod angle;
 mod arithmetic;
+mod decisive;
 mod dihedral;
 mod elementary;
 mod error_function;
