@@ -39,7 +39,7 @@ enum Piece {
 }
 
 /// Numbers, stored numbers and constants that look like either.
-const NUMBERS: &[&str] = &["0", "1", "-1", "2", "0.5", "3", "(1/3)", "π", "C"];
+const NUMBERS: &[&str] = &["0", "1", "(-1)", "2", "0.5", "3", "(1/3)", "π", "C"];
 const STORED: &[&str] = &["w[0]", "w[1]", "w[2]", "V", "B[0][1]", "u[1].y"];
 const MIXED: &[&str] = &["2", "w[0]", "w[1]", "k", "0.25", "a[1]"];
 const INDICES: &[&str] = &["0", "1", "2", "C - 2"];
@@ -106,7 +106,7 @@ impl Grammar<'_> {
             "(@c - cos(@s))",
             "sin(@s)",
             "sqrt(1 + (@s)^2)",
-            "log(@c * @c + 1 + (@s)^2)",
+            "log(1 + (@c)^2 + (@s)^2)",
             "min(@s, @x)",
             "clamp(@s, @c, 5)",
             "huber(@s, 1.5)",
