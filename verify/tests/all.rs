@@ -9,6 +9,7 @@ mod functions;
 mod printed_mistakes;
 mod random_programs;
 mod sampling;
+mod series_remainders;
 mod singular_programs;
 mod structure;
 mod uncompensated;
