@@ -57,6 +57,8 @@ fn naive_and_robust_spellings_are_the_same_code() {
         ("sin(x) / x", "x^2 * sin(x) / x^3"),
         ("(1 - cos(k * norm(a))) / dot(a, a)", "k^2 * ((1 - cos(k * norm(a))) / (k * norm(a))^2)"),
         ("(norm(a) * norm(b) + dot(a, b))", "norm(a) * norm(b) * (1 + dot(unit(a), unit(b)))"),
+        ("(1 - dot(a, b) / (norm(b) * norm(a)))", "(1 - dot(unit(a), unit(b)))"),
+        ("(1 + dot(b, a) / norm(a) / norm(b))", "(1 + dot(unit(a), unit(b)))"),
         ("(norm(b) * norm(a) - dot(a, b))", "norm(a) * norm(b) * (1 - dot(unit(a), unit(b)))"),
         ("acos(dot(unit(a), unit(b)))", "angle(a, b)"),
         ("(1 - cos(dihedral(p, r, q, a)))", "one_minus_cos(dihedral(p, r, q, a))"),

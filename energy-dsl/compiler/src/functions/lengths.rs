@@ -1,5 +1,6 @@
-//! Recognises ‖a‖‖b‖ ± a·b, the divisor of the curvature of discrete rods 2 a×b/(‖a‖‖b‖ + a·b). It cancels where a and
-//! b are nearly opposite, or parallel. ‖a‖‖b‖ (1 ± cos φ) does not: 1 ± cos φ is a primitive of the angle φ.
+//! Recognises ‖a‖‖b‖ ± a·b, the divisor of the curvature of discrete rods 2 a×b/(‖a‖‖b‖ + a·b), and 1 ± a·b/(‖a‖‖b‖).
+//! They cancel where a and b are nearly opposite, or parallel. ‖a‖‖b‖ (1 ± cos φ) does not: 1 ± cos φ is a primitive of
+//! the angle φ.
 
 use super::angle::one_minus_cosine;
 use crate::graph::{Graph, NodeId, Op, Primitive};
@@ -17,22 +18,55 @@ pub(super) fn recognise_lengths_minus_dot(g: &mut Graph, x: NodeId, y: NodeId) -
     })
 }
 
+/// Recognises 1 + a·b/(‖a‖‖b‖).
+pub(super) fn recognise_one_plus_quotient(g: &mut Graph, x: NodeId, y: NodeId) -> Option<NodeId> {
+    let quotient = if g.is(x, 1.0) { y } else { x };
+    (g.is(x, 1.0) || g.is(y, 1.0)).then(|| one_minus_quotient(g, quotient, false))?
+}
+
+/// Recognises 1 − a·b/(‖a‖‖b‖).
+pub(super) fn recognise_one_minus_quotient(g: &mut Graph, one: NodeId, quotient: NodeId) -> Option<NodeId> {
+    g.is(one, 1.0).then(|| one_minus_quotient(g, quotient, true))?
+}
+
+fn one_minus_quotient(g: &mut Graph, quotient: NodeId, negative: bool) -> Option<NodeId> {
+    let (quotient, minus) = g.magnitude(quotient);
+    let Op::Div(above, below) = g.op(quotient) else { return None };
+    // a·b/‖a‖/‖b‖ is the same.
+    let (dot, [a, b]) = match (vectors_of_lengths(g, below), g.op(above)) {
+        (Some(vectors), _) => (above, vectors),
+        (None, Op::Div(dot, first)) => (dot, [vector_of_length(g, first)?, vector_of_length(g, below)?]),
+        _ => return None,
+    };
+    let opposite = is_dot(g, dot, &a, &b)? != minus;
+    let arguments = turned(g, [a, b], negative != opposite);
+    Some(one_minus_cosine(g, arguments))
+}
+
+/// Returns the components of a and b, or of a and −b.
+fn turned(g: &mut Graph, [a, b]: [Vec<NodeId>; 2], same: bool) -> Vec<NodeId> {
+    let b = if same { b } else { b.iter().map(|&x| g.neg(x)).collect() };
+    [a, b].concat()
+}
+
 fn lengths_and_dot(g: &mut Graph, lengths: NodeId, dot: NodeId, negative: bool) -> Option<NodeId> {
     let [a, b] = vectors_of_lengths(g, lengths)?;
     let opposite = is_dot(g, dot, &a, &b)?;
-    let b = if negative != opposite { b } else { b.iter().map(|&x| g.neg(x)).collect() };
-    let one_minus = one_minus_cosine(g, [a, b].concat());
+    let arguments = turned(g, [a, b], negative != opposite);
+    let one_minus = one_minus_cosine(g, arguments);
     Some(g.mul(lengths, one_minus))
 }
 
 /// Returns a and b of ‖a‖‖b‖, two different vectors in space.
 fn vectors_of_lengths(g: &Graph, product: NodeId) -> Option<[Vec<NodeId>; 2]> {
     let Op::Mul(x, y) = g.op(product) else { return None };
-    let vector = |length: NodeId| {
-        let rule = g.rule(length).filter(|rule| rule.primitive == Primitive::Norm)?;
-        rule.vector.clone().filter(|vector| vector.len() == 3)
-    };
-    (x != y).then_some([vector(x)?, vector(y)?])
+    (x != y).then_some([vector_of_length(g, x)?, vector_of_length(g, y)?])
+}
+
+/// Returns the vector in space whose length a node is.
+fn vector_of_length(g: &Graph, length: NodeId) -> Option<Vec<NodeId>> {
+    let rule = g.rule(length).filter(|rule| rule.primitive == Primitive::Norm)?;
+    rule.vector.clone().filter(|vector| vector.len() == 3)
 }
 
 /// Returns whether a sum of products is −a·b; `None` if it is neither a·b nor −a·b.

@@ -120,6 +120,18 @@ pub const RECOGNISERS: &[Recogniser] = &[
         recognise: lengths::recognise_lengths_minus_dot,
     },
     Recogniser {
+        spelling: "1 + dot(a, b) / (norm(a) * norm(b))",
+        form: "2 cos²(φ/2) of the angle φ between a and b",
+        ending: Ending::WrittenSum,
+        recognise: lengths::recognise_one_plus_quotient,
+    },
+    Recogniser {
+        spelling: "1 - dot(a, b) / (norm(a) * norm(b))",
+        form: "2 sin²(φ/2) of the angle φ between a and b",
+        ending: Ending::WrittenDifference,
+        recognise: lengths::recognise_one_minus_quotient,
+    },
+    Recogniser {
         spelling: "norm(d) - L",
         form: "the elongation, accurate near rest; so is its \
         square",

@@ -51,6 +51,7 @@ const SIGNS: &[(char, &str)] = &[
     ('∏', "a product of the factors"),
     ('∂', "gradient(U, p)"),
     ('∇', "gradient(U, p)"),
+    ('∞', "infinity"),
     ('∧', "&&"),
     ('∨', "||"),
 ];

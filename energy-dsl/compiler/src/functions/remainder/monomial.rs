@@ -12,8 +12,8 @@ pub(super) struct Monomial {
     pub(super) powers: BTreeMap<NodeId, i32>,
 }
 
-/// Factors that a monomial may have; longer products are not searched.
-const MOST_FACTORS: usize = 16;
+/// Factors that a search visits. Powers of powers have many more.
+pub(super) const MOST_FACTORS: usize = 64;
 
 impl Monomial {
     fn one() -> Self {
@@ -23,8 +23,9 @@ impl Monomial {
     /// Splits a node into its factors. `lengths` are norms of vectors, whose squares are sums of squares.
     pub(super) fn of(g: &Graph, node: NodeId, lengths: &[NodeId]) -> Self {
         let mut monomial = Self::one();
-        let mut open = vec![(node, 1)];
+        let (mut open, mut visited) = (vec![(node, 1)], 0);
         while let Some((node, power)) = open.pop() {
+            visited += 1;
             if let Some((factor, length)) = squared_length(g, node, lengths) {
                 monomial.coefficient *= factor.powi(power);
                 monomial.raise(length, 2 * power);
@@ -33,7 +34,7 @@ impl Monomial {
             let is_power = g.rule(node).is_some_and(|rule| rule.primitive == Primitive::NormPower);
             let resolved = if is_power { g.resolve(node) } else { node };
             match g.op(resolved) {
-                _ if open.len() > MOST_FACTORS => monomial.raise(node, power),
+                _ if visited > MOST_FACTORS => monomial.raise(node, power),
                 Op::Constant(bits) => monomial.coefficient *= f64::from_bits(bits).powi(power),
                 Op::Neg(x) => {
                     monomial.coefficient *= -1.0;

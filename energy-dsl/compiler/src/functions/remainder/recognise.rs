@@ -2,14 +2,12 @@
 
 use super::super::elementary::{sine_remainder, versine};
 use super::super::exponential::{expm1, log1pmx};
-use super::monomial::{Monomial, lengths};
+use super::monomial::{MOST_FACTORS, Monomial, lengths};
 use super::series::{constant_term, remainder, successor, whole_remainder};
 use crate::graph::{Expansion, Graph, NodeId, Op, Primitive};
 
 /// Terms of a sum that are searched.
 const MOST_TERMS: usize = 12;
-/// Factors of a product that are searched.
-const MOST_FACTORS: usize = 16;
 /// Order of the largest remainder.
 const LARGEST_ORDER: u32 = 12;
 /// Coefficients that differ by this part are equal: each is rounded a few times.
@@ -91,26 +89,21 @@ fn functions_in(g: &Graph, sum: &[(NodeId, f64)]) -> Vec<Function> {
 
 /// Adds the functions among the factors of a product.
 fn functions_of(g: &Graph, product: NodeId, found: &mut Vec<Function>) {
-    let mut open = vec![product];
-    while let Some(node) = open.pop() {
-        match g.op(node) {
-            Op::Mul(x, y) if open.len() < MOST_FACTORS => open.extend([x, y]),
-            Op::Div(x, _) => open.push(x),
-            Op::Neg(x) => open.push(x),
-            Op::Exp(_) | Op::Sin(_) | Op::Cos(_) | Op::Rule(_) => found.extend(function(g, node)),
-            _ => {}
-        }
-    }
+    found.extend(factors(g, product).into_iter().filter_map(|factor| function(g, factor)));
 }
 
-/// Returns whether a node is a factor of a product.
-fn is_factor(g: &Graph, factor: NodeId, product: NodeId) -> bool {
-    match g.op(product) {
-        _ if product == factor => true,
-        Op::Mul(x, y) => is_factor(g, factor, x) || is_factor(g, factor, y),
-        Op::Div(x, _) | Op::Neg(x) => is_factor(g, factor, x),
-        _ => false,
+/// Returns the first factors of a product, above its divisors.
+fn factors(g: &Graph, product: NodeId) -> Vec<NodeId> {
+    let (mut open, mut found) = (vec![product], Vec::new());
+    for _ in 0..MOST_FACTORS {
+        let Some(node) = open.pop() else { break };
+        match g.op(node) {
+            Op::Mul(x, y) => open.extend([x, y]),
+            Op::Div(x, _) | Op::Neg(x) => open.push(x),
+            _ => found.push(node),
+        }
     }
+    found
 }
 
 /// Returns the function of higher order that a sum equals, and its factor; `None` if the sum has other terms.
@@ -147,22 +140,19 @@ fn reduced(g: &Graph, sum: &[(NodeId, f64)], function: Function) -> Option<(Func
 
 /// Returns the only term of a sum that a function is a factor of, and its sign.
 fn own_term(g: &Graph, sum: &[(NodeId, f64)], function: NodeId) -> Option<(NodeId, f64)> {
-    let mut found = None;
+    let mut found = Vec::new();
     let mut open = sum.to_vec();
     while let Some((node, sign)) = open.pop() {
         match g.op(node) {
             Op::Add(a, b) => open.extend([(a, sign), (b, sign)]),
             Op::Sub(a, b) => open.extend([(a, sign), (b, -sign)]),
-            _ if is_factor(g, function, node) => {
-                if found.replace((node, sign)).is_some() {
-                    return None;
-                }
-            }
+            _ if factors(g, node).contains(&function) => found.push((node, sign)),
             Op::Neg(a) => open.push((a, -sign)),
             _ => {}
         }
     }
-    found
+    let [own] = found[..] else { return None };
+    Some(own)
 }
 
 /// Removes the head of the series from xᵏ Φₖ. Returns the order k′ and the sign of the remainder; `None` if terms of the
@@ -171,7 +161,7 @@ fn after_head(function: Function, mut head: Vec<(u32, f64)>) -> Option<(u32, f64
     let (mut k, mut sign) = (function.k, 1.0);
     while !head.is_empty() {
         let number = head.iter().filter(|(power, _)| *power == k).map(|(_, number)| number).sum::<f64>();
-        let expected = -sign * if k == 0 { 1.0 } else { constant_term(function.expansion, k) };
+        let expected = -sign * constant_term(function.expansion, k);
         if (number - expected).abs() > SAME * expected.abs() || k > LARGEST_ORDER {
             return None;
         }
@@ -211,7 +201,7 @@ fn built(g: &mut Graph, function: Function, factor: &Monomial) -> NodeId {
 pub(in super::super) fn recognise_quotient(g: &mut Graph, above: NodeId, below: NodeId) -> Option<NodeId> {
     let mut functions = Vec::new();
     functions_of(g, above, &mut functions);
-    functions.retain(|function| g.varies(function.x));
+    functions.retain(|function| function.k > 0 && g.varies(function.x));
     let (function, factor) = functions.into_iter().find_map(|function| cancelled(g, above, below, function))?;
     let rest = remainder(g, function.expansion, function.k, function.x);
     let factor = factor.build(g);

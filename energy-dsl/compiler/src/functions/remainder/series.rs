@@ -62,17 +62,25 @@ pub(super) fn whole_remainder(g: &mut Graph, expansion: Expansion, k: u32, x: No
             let linear = g.add(less, scaled);
             [value, reciprocal, g.mul(linear, square)]
         }
-        _ => [k, k - 1, k - 2].map(|k| derivatives(g, expansion, k, x)[0]),
+        _ => [k, k - 1, k - 2].map(|k| value(g, expansion, k, x)),
     };
     let [value, first, second] = [(value, 0), (below, 1), (lowest, 2)].map(|(rest, i)| g.mul(powers[i], rest));
     let primitive = Primitive::Remainder(expansion, k as u8, k as u8);
     g.add_rule(Rule::smooth(primitive, vec![x], value, vec![first], vec![second]), &[])
 }
 
-/// Returns Φₖ, Φₖ′ and Φₖ″: by power series near 0, elsewhere by recurrences.
+/// Returns Φₖ; φ₀ is the exponential, c₀ the cosine.
+fn value(g: &mut Graph, expansion: Expansion, k: u32, x: NodeId) -> NodeId {
+    match (expansion, k) {
+        (Expansion::Exponential, 0) => g.exp(x),
+        (Expansion::Trigonometric, 0) => g.cos(x),
+        _ => derivatives(g, expansion, k, x)[0],
+    }
+}
+
+/// Returns Φₖ, Φₖ′ and Φₖ″, k > 0: by power series near 0, elsewhere by recurrences.
 fn derivatives(g: &mut Graph, expansion: Expansion, k: u32, x: NodeId) -> [NodeId; 3] {
     match (expansion, k) {
-        (Expansion::Exponential, 0) => [g.exp(x); 3],
         (Expansion::Exponential, _) => {
             let (near, far) = (exponential_near(g, k, x), exponential_far(g, k, x));
             near_or_far(g, x, exponential_below(k), near, far)
@@ -87,15 +95,11 @@ fn derivatives(g: &mut Graph, expansion: Expansion, k: u32, x: NodeId) -> [NodeI
         }
         (Expansion::Trigonometric, _) => {
             let (mut near, far) = (trigonometric_near(g, k, x), trigonometric_far(g, k, x));
-            match k {
-                0 => return far,
+            if k == 1 {
                 // The sine itself does not cancel.
-                1 => {
-                    let (zero, one) = (g.constant(0.0), g.constant(1.0));
-                    let at_zero = g.equal(x, zero);
-                    near[0] = g.select(at_zero, one, far[0]);
-                }
-                _ => {}
+                let (zero, one) = (g.constant(0.0), g.constant(1.0));
+                let at_zero = g.equal(x, zero);
+                near[0] = g.select(at_zero, one, far[0]);
             }
             near_or_far(g, x, trigonometric_below(k), near, far)
         }
@@ -242,9 +246,6 @@ fn recurrent(
         let difference = g.plain_difference(below, scaled);
         g.div(difference, x)
     };
-    if k == 0 {
-        return [all[0], slope_of_zeroth, slope_of_zeroth];
-    }
     let (own, below) = (slope(k), slope(k - 1));
     let factor = g.constant(f64::from(k + 1));
     let scaled = g.mul(factor, own);
