@@ -11,10 +11,8 @@ impl Checker<'_> {
     /// Returns the remedy for a name that is not declared.
     pub(super) fn remedy_for_name(&self, name: &str) -> String {
         let known = || self.scopes.iter().flat_map(|scope| scope.keys()).map(|known| self.as_written(known));
-        if let Some(declared) = known().find(|declared| picture(declared) == picture(name))
-            && let Some(difference) = difference(name, declared)
-        {
-            return format!("did you mean `{declared}`? They look alike, but {difference}");
+        if let Some(look_alike) = look_alike(name, known()) {
+            return look_alike;
         }
         if functions::find(name).is_some() {
             return format!("`{name}` is a function: call it with its arguments in parentheses");
@@ -44,6 +42,9 @@ impl Checker<'_> {
         }
         let mut known: Vec<&str> = functions::all().map(|function| function.name).collect();
         known.extend(self.functions.iter().map(|function| function.name.text.as_str()));
+        if let Some(look_alike) = look_alike(name, known.iter().copied()) {
+            return look_alike;
+        }
         habits::functions_elsewhere().for_each(|name| known.push(name));
         match nearest(name, known) {
             Some(near) => match habits::function(near) {
@@ -58,6 +59,13 @@ impl Checker<'_> {
     fn as_written<'b>(&'b self, canonical: &'b str) -> &'b str {
         self.spellings.get(canonical).map_or(canonical, String::as_str)
     }
+}
+
+/// Returns the remedy for a name that looks like one of the known names.
+fn look_alike<'a>(name: &str, mut known: impl Iterator<Item = &'a str>) -> Option<String> {
+    let declared = known.find(|declared| picture(declared) == picture(name))?;
+    let difference = difference(name, declared)?;
+    Some(format!("did you mean `{declared}`? They look alike, but {difference}"))
 }
 
 /// Returns the remedy for arguments whose shapes a function does not take.
