@@ -151,3 +151,26 @@ fn half_the_sine_of_a_nearly_flat_hinge_is_accurate() {
     assert_eq!(flat.gradient.map(|g| g[2].abs()), [0.5, 0.5, 1.0, 0.0], "the derivatives of one side");
     assert!(flat.hessian.as_flattened().as_flattened().iter().all(|h| h.is_finite()));
 }
+
+energy! {
+    energy Remainders(p: Point; k: Scalar) {
+        k * (exp(p.x) - 1 - p.x) / p.x^2 + (sin(p.y) - p.y) / p.y^3 + log(1 + p.z) / p.z
+    }
+}
+
+/// Remainders of Taylor series are regular at 0, in both precisions: φ₂ = ½, φ₂′ = 1/6, φ₂″ = 1/12.
+#[test]
+fn remainders_of_series_are_regular_at_zero() {
+    for p in [[0.0; 3], [1e-200, -1e-30, 1e-12]] {
+        let at = Remainders::<f64>::new(2.0).hessian(&[p]);
+        assert!((at.value - (1.0 - 1.0 / 6.0 + 1.0)).abs() < 1e-11 && !at.flags.any());
+        for (found, expected) in at.gradient[0].iter().zip([1.0 / 3.0, 0.0, -0.5]) {
+            assert!((found - expected).abs() < 1e-11, "{found}, {expected}");
+        }
+        for (i, expected) in [1.0 / 6.0, 1.0 / 60.0, 2.0 / 3.0].into_iter().enumerate() {
+            assert!((at.hessian[0][i][i] - expected).abs() < 1e-11, "{:?}", at.hessian);
+        }
+    }
+    let at = Remainders::<f32>::new(2.0).hessian(&[[1e-30, 0.0, -1e-20]]);
+    assert!((at.hessian[0][0][0] - 1.0 / 6.0).abs() < 1e-7 && !at.flags.any());
+}
