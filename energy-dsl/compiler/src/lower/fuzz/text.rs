@@ -231,6 +231,7 @@ pub(super) fn with_result(result: &str) -> String {
             let _E = (transpose(F) * F - identity(3)) / 2;
             let _J = det(F);
             let _s = singular_values(F);
+            let _every_function = f(J, 1) + g(F[0], 1) + h(F, 1);
             {result}
         }}"
     )
