@@ -15,6 +15,8 @@ use crate::syntax::{Constant, Expression, Name};
 pub(super) struct Globals {
     pub(super) bindings: Vec<Binding>,
     pub(super) scope: BTreeMap<String, Option<Meaning>>,
+    /// Names as written, by their canonical names.
+    pub(super) spellings: BTreeMap<String, String>,
 }
 
 impl Globals {
@@ -27,6 +29,7 @@ impl Globals {
             let mut checker = Checker::new(&signature, &globals, &[], diagnostics);
             let meaning = checker.constant(constant);
             globals.bindings = checker.bindings;
+            globals.spellings.insert(canonical.clone(), constant.name.text.clone());
             globals.scope.insert(canonical, meaning);
         }
         globals

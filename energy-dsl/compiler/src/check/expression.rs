@@ -55,13 +55,15 @@ impl<'a> Checker<'a> {
             .iter()
             .map(|n| (n.name.canonical(), Some(Meaning::Input(n.source, n.first, n.shape, n.length))))
             .collect();
+        let written = signature.names.iter().map(|n| (n.name.canonical(), n.name.text.clone()));
+        let spellings = globals.spellings.clone().into_iter().chain(written).collect();
         Self {
             signature,
             functions: functions.to_vec(),
             diagnostics,
             scopes: vec![globals.scope.clone(), inputs],
             calls: Vec::new(),
-            spellings: signature.names.iter().map(|n| (n.name.canonical(), n.name.text.clone())).collect(),
+            spellings,
             inlined: 0,
             used: BTreeSet::new(),
             in_rest: false,
