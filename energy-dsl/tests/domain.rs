@@ -25,6 +25,7 @@ energy! {
     energy Branches(p: Point) { if p.x > 0 { log(p.x) } else { p.x^2 } }
     energy Condition(p: Point) { if log(p.x) > 0 { 1 } else { p.y } }
     energy Cancelling(p: Point) { log((p.x + 1e8)^2 - p.x^2 - 2e8 * p.x - 1e16 + p.y) }
+    energy Refused(p: Point; k: Scalar[N]) { if p.x <= 0 { infinity } else { -k * p.x } }
     constraint Depth(p: Point) { log(p.x) }
     force Pull(p: Point) { [log(p.x) * p] }
     residual Distance(p: Vec2) { [sqrt(p[0]), p[1]] }
@@ -73,6 +74,18 @@ fn a_branch_that_is_not_taken_has_no_domain() {
     // A condition without a value fails.
     let at = Condition::<f64>::new().gradient(&[[-1.0, 4.0, 0.0]]);
     assert!(at.value == 4.0 && at.gradient[0] == [0.0, 1.0, 0.0] && !at.flags.any(), "{at:?}");
+}
+
+#[test]
+fn formulas_may_be_infinite() {
+    let wall = Refused::<f64>::new(3.0);
+    let at = wall.hessian(&[[-1.0, 0.0, 0.0]]);
+    assert!(at.value == f64::INFINITY && at.flags.degenerate && at.gradient == [[0.0; 3]], "{at:?}");
+    assert!(at.hessian == [[[0.0; 3]; 3]]);
+    let at = wall.gradient(&[[2.0, 0.0, 0.0]]);
+    assert!(at.value == -6.0 && at.gradient[0][0] == -3.0 && !at.flags.any(), "{at:?}");
+    let single = Refused::<f32>::new(3.0).value(&[[-1.0, 0.0, 0.0]]);
+    assert!(single.value == f32::INFINITY && single.flags.degenerate);
 }
 
 /// Within the rounding errors of the argument, its sign is unknown, and rays decide.

@@ -24,6 +24,8 @@ energy! {
         vector(dot(offset, vector(1, t)) - slope, sin(slope * t), max(bend, slope)^2)
     }
 
+    residual Aimed(scale: Scalar; target: Point) { scale * target }
+
     energy Soft(p: Point; k: Scalar) {
         let r = norm_squared(p);
         if r < 1 { k * r } else { k * (2 * sqrt(r) - 1) }
@@ -51,6 +53,13 @@ fn functions_are_shared_between_declarations() {
     let declaration = <Chain as Element>::DECLARATION;
     assert!(declaration.translation_invariant);
     assert_eq!(declaration.reduced_coordinates, 6, "two differences of three points");
+}
+
+#[test]
+fn points_after_the_unknowns_are_parameters() {
+    let aimed = Aimed::new(P);
+    assert_eq!(<Aimed as Element>::DECLARATION.points.len(), 1, "one unknown");
+    assert_eq!(aimed.residual(&[2.0]).value, P.map(|x| 2.0 * x));
 }
 
 #[test]

@@ -48,6 +48,18 @@ fn naive_and_robust_spellings_are_the_same_code() {
         ("(x * x - 4)", "(x - 2) * (x + 2)"),
         ("(1 - y^2)", "(1 - y) * (1 + y)"),
         ("(1 - cos(x))", "one_minus_cos(x)"),
+        ("(cos(x) - 1)", "(-one_minus_cos(x))"),
+        ("(x - sin(x))", "x_minus_sin(x)"),
+        ("(log(1 + x) - x)", "log1pmx(x)"),
+        ("(exp(x) - 1 - x)", "(exp(x) - (x + 1))"),
+        ("(exp(x) - 1 - x) / x^2", "(exp(x) - x - 1) * x^(-2)"),
+        ("(k * exp(x) - k - k * x) / x^2", "k * ((exp(x) - 1 - x) / x^2)"),
+        ("sin(x) / x", "x^2 * sin(x) / x^3"),
+        ("(1 - cos(k * norm(a))) / dot(a, a)", "k^2 * ((1 - cos(k * norm(a))) / (k * norm(a))^2)"),
+        ("(norm(a) * norm(b) + dot(a, b))", "norm(a) * norm(b) * (1 + dot(unit(a), unit(b)))"),
+        ("(1 - dot(a, b) / (norm(b) * norm(a)))", "(1 - dot(unit(a), unit(b)))"),
+        ("(1 + dot(b, a) / norm(a) / norm(b))", "(1 + dot(unit(a), unit(b)))"),
+        ("(norm(b) * norm(a) - dot(a, b))", "norm(a) * norm(b) * (1 - dot(unit(a), unit(b)))"),
         ("acos(dot(unit(a), unit(b)))", "angle(a, b)"),
         ("(1 - cos(dihedral(p, r, q, a)))", "one_minus_cos(dihedral(p, r, q, a))"),
     ] {
@@ -90,6 +102,10 @@ fn unlike_spellings_stay_as_they_are() {
         ("(exp(x) - 2)", "(expm1(x) - 1)"),
         ("(x^2 - 3)", "(x^2 - 4)"),
         ("(x * y - y^2)", "(x - y) * (x + y)"),
+        ("(exp(x) - 1 - y)", "(exp(x) - 1 - x)"),
+        ("(exp(x) - 1 - 2 * x)", "(exp(x) - 1 - x) - x"),
+        ("sin(x) / y", "sin(x) / x * x / y"),
+        ("(norm(a) * norm(b) + dot(a, p))", "norm(a) * norm(b) * (1 + dot(unit(a), unit(p)))"),
     ] {
         assert!(plan(one) != plan(other), "{one} became {other}");
     }
@@ -134,4 +150,27 @@ fn half_the_sine_of_a_nearly_flat_hinge_is_accurate() {
     assert_eq!((flat.value, flat.flags.kink, flat.flags.degenerate), (0.0, true, false));
     assert_eq!(flat.gradient.map(|g| g[2].abs()), [0.5, 0.5, 1.0, 0.0], "the derivatives of one side");
     assert!(flat.hessian.as_flattened().as_flattened().iter().all(|h| h.is_finite()));
+}
+
+energy! {
+    energy Remainders(p: Point; k: Scalar) {
+        k * (exp(p.x) - 1 - p.x) / p.x^2 + (sin(p.y) - p.y) / p.y^3 + log(1 + p.z) / p.z
+    }
+}
+
+/// Remainders of Taylor series are regular at 0, in both precisions: φ₂ = ½, φ₂′ = 1/6, φ₂″ = 1/12.
+#[test]
+fn remainders_of_series_are_regular_at_zero() {
+    for p in [[0.0; 3], [1e-200, -1e-30, 1e-12]] {
+        let at = Remainders::<f64>::new(2.0).hessian(&[p]);
+        assert!((at.value - (1.0 - 1.0 / 6.0 + 1.0)).abs() < 1e-11 && !at.flags.any());
+        for (found, expected) in at.gradient[0].iter().zip([1.0 / 3.0, 0.0, -0.5]) {
+            assert!((found - expected).abs() < 1e-11, "{found}, {expected}");
+        }
+        for (i, expected) in [1.0 / 6.0, 1.0 / 60.0, 2.0 / 3.0].into_iter().enumerate() {
+            assert!((at.hessian[0][i][i] - expected).abs() < 1e-11, "{:?}", at.hessian);
+        }
+    }
+    let at = Remainders::<f32>::new(2.0).hessian(&[[1e-30, 0.0, -1e-20]]);
+    assert!((at.hessian[0][0][0] - 1.0 / 6.0).abs() < 1e-7 && !at.flags.any());
 }

@@ -10,6 +10,7 @@ mod near_singularities;
 mod printed_mistakes;
 mod random_programs;
 mod sampling;
+mod series_remainders;
 mod singular_programs;
 mod spectral_accuracy;
 mod structure;

@@ -85,12 +85,19 @@ pub struct Diagnostic {
     pub span: Span,
     /// Another place that the error concerns, and a note on it.
     pub other: Option<(String, Span)>,
+    /// Whether rustc has reported the error, as it does with a bad escape in a string. It is not reported again.
+    pub known_to_rustc: bool,
 }
 
 impl Diagnostic {
     /// Creates an error at a place.
     pub fn new(span: &Span, message: impl Into<String>) -> Self {
-        Self { message: message.into(), help: None, span: span.clone(), other: None }
+        Self { message: message.into(), help: None, span: span.clone(), other: None, known_to_rustc: false }
+    }
+
+    /// Creates an error that rustc has reported already.
+    pub(crate) fn known_to_rustc(span: &Span) -> Self {
+        Self { known_to_rustc: true, ..Self::new(span, "an error of Rust") }
     }
 
     /// Adds another place, and a note on it.
@@ -130,9 +137,11 @@ impl fmt::Display for Diagnostic {
 pub struct Diagnostics(pub Vec<Diagnostic>);
 
 impl Diagnostics {
-    /// Adds an error.
+    /// Adds an error, unless rustc has reported it.
     pub fn push(&mut self, diagnostic: Diagnostic) {
-        self.0.push(diagnostic);
+        if !diagnostic.known_to_rustc {
+            self.0.push(diagnostic);
+        }
     }
 
     /// Returns `value` if there are no errors.
@@ -174,20 +183,28 @@ pub fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Opti
     // Single letters are excluded: each is similar to every other.
     let length = name.chars().count();
     let limit = (1 + length / 4).min(length.saturating_sub(1));
-    known.into_iter().map(|k| (edit_distance(name, k), k)).filter(|&(d, _)| d <= limit).min().map(|(_, k)| k)
+    let distance = |known: &str| match known.to_lowercase() == name.to_lowercase() {
+        true => 0,
+        false => edit_distance(name, known),
+    };
+    known.into_iter().map(|k| (distance(k), k)).filter(|&(d, _)| d <= limit).min().map(|(_, k)| k)
 }
 
+/// Counts the characters to insert, delete, replace or exchange with their neighbour (Damerau).
 fn edit_distance(a: &str, b: &str) -> usize {
-    let b: Vec<char> = b.chars().collect();
-    let mut row: Vec<usize> = (0..=b.len()).collect();
-    for (i, x) in a.chars().enumerate() {
-        let mut diagonal = row[0];
-        row[0] = i + 1;
-        for (j, y) in b.iter().enumerate() {
-            let substituted = diagonal + usize::from(x != *y);
-            diagonal = row[j + 1];
-            row[j + 1] = substituted.min(row[j] + 1).min(diagonal + 1);
+    let (a, b): (Vec<char>, Vec<char>) = (a.chars().collect(), b.chars().collect());
+    let mut rows = vec![(0..=b.len()).collect::<Vec<usize>>()];
+    for i in 1..=a.len() {
+        let mut row = vec![i];
+        for j in 1..=b.len() {
+            let substituted = rows[i - 1][j - 1] + usize::from(a[i - 1] != b[j - 1]);
+            let mut least = substituted.min(row[j - 1] + 1).min(rows[i - 1][j] + 1);
+            if i > 1 && j > 1 && (a[i - 1], a[i - 2]) == (b[j - 2], b[j - 1]) {
+                least = least.min(rows[i - 2][j - 2] + 1);
+            }
+            row.push(least);
         }
+        rows.push(row);
     }
-    row[b.len()]
+    rows[a.len()][b.len()]
 }

@@ -120,6 +120,43 @@ fn functions_compute_what_they_say() {
     }
 }
 
+/// A point after the first `;` is a parameter, whatever the kind is.
+#[test]
+fn points_after_the_unknowns_are_parameters() {
+    for (source, unknowns, parameters) in [
+        ("residual A(s: Scalar; p: Point) { s * p }", &[2.0][..], &[1.0, 2.0, 3.0][..]),
+        ("residual A(p: Point; q: [Point; 2]) { p - q[1] }", &[4.0, 4.0, 4.0], &[0.0, 0.0, 0.0, 2.0, 0.0, -2.0]),
+        ("constraint A(p: Point; q: Point) { 2 * (p - q) }", &[2.0, 2.0, 2.0], &[1.0, 0.0, -1.0]),
+    ] {
+        let program = Textbook::from_source(source).unwrap_or_else(|e| panic!("{source}\n{e}"));
+        let inputs = Inputs { parameters, rest: &[], positions: unknowns, velocities: &[] };
+        assert_eq!(program.evaluate(&inputs), [2.0, 4.0, 6.0], "{source}");
+    }
+}
+
+#[test]
+fn infinity_is_a_value_of_any_unit() {
+    let source = "energy A(p, q: Point; k: Scalar[N/m], E: Scalar[J], L: Scalar[m]) {
+        let r = \"‖p − q‖\";
+        if r <= L && infinity > r { infinity } else { min(k / 2 * r^2, infinity) + max(-infinity, E) + \"E r / (r + ∞)\" }
+    }";
+    let program = Textbook::from_source(source).unwrap_or_else(|e| panic!("{source}\n{e}"));
+    for (x, expected) in [(0.5, f64::INFINITY), (2.0, 9.0)] {
+        let positions = [x, 0.0, 0.0, 0.0, 0.0, 0.0];
+        let inputs = Inputs { parameters: &[2.0, 5.0, 1.0], rest: &[], positions: &positions, velocities: &[] };
+        assert_eq!(program.evaluate(&inputs), [expected]);
+    }
+}
+
+/// Numbers that move may be equal in a region, where they have pieces.
+#[test]
+fn equalities_that_hold_in_a_region_are_accepted() {
+    for condition in ["max(norm(p), 1) == 1", "k == 2", "abs(p.x) != p.x", "sign(p.x) == sign(p.y)"] {
+        let source = format!("energy A(p: Point; k: Scalar) {{ if {condition} {{ k }} else {{ norm(p) }} }}");
+        Textbook::from_source(&source).unwrap_or_else(|e| panic!("{source}\n{e}"));
+    }
+}
+
 /// Correct units are accepted, including inferred ones.
 #[test]
 fn right_units_are_accepted() {

@@ -125,3 +125,70 @@ fn a_loop_returns_what_unrolled_terms_return() {
         }
     }
 }
+
+/// An energy of singular values, strains and vectors, with `result` behind a `rest` block.
+fn membrane(result: &str) -> String {
+    format!(
+        "energy Membrane(_a, _b, _c: Point; rest u0, u1, u2: Vec2; _k, _α: Scalar, _w: [Scalar; 2]) {{
+            rest {{
+                let D = columns(u1 - u0, u2 - u0);
+                let B = inverse(D);
+                let A = det(D) / 2;
+            }}
+            let F = columns(b - a, c - a) * B;
+            let E = (transpose(F) * F - identity(2)) / 2;
+            let s = singular_values(F);
+            let _used = E[0][0] + s[0];
+            A * ({result})
+        }}"
+    )
+}
+
+#[test]
+fn terms_that_differ_in_an_index_are_unrolled() {
+    for like in [
+        "k * ((s[0] - 1)^2 + (s[1] - 1)^2)",
+        "sum(i in 0..2, s[i]^2)",
+        "E[0][0]^2 + E[1][1]^2",
+        "exp(s[0]) + exp(s[1])",
+        "s[0]^α + s[1]^α",
+        "w[0] * F[0][0]^2 + w[1] * F[1][1]^2",
+        "norm(F[0]) + norm(F[1]) + norm(F[2])",
+        "k / 2 * (abs(F[0][0])^3 + abs(F[1][0])^2)",
+        "log(1 + gradient(E[0][0], a)[0]^2) + log(1 + gradient(E[0][0], a)[1]^2)",
+    ] {
+        let [like, unlike] = [membrane(like), membrane(&format!("{like} + 0 * norm_squared(a)"))].map(|source| {
+            let element = Interpreted::from_source(&source).unwrap_or_else(|e| panic!("{source}\n{e}")).remove(0);
+            let positions = [0.1, 0.2, 0.3, 1.0, 0.5, 0.4, 0.3, 1.1, 0.2];
+            let rest = [0.0, 0.0, 1.0, 0.0, 0.0, 1.0];
+            let parameters = [1.5, 0.7, 2.0, 3.0];
+            let inputs = Inputs { parameters: &parameters, rest: &rest, positions: &positions, velocities: &[] };
+            element.evaluate::<f64>(&inputs).expect("a sound rest shape").blocks
+        });
+        assert_eq!(like[0].1.len(), 1);
+        assert!((like[0].1[0] - unlike[0].1[0]).abs() <= 4e-16 * like[0].1[0].abs(), "{like:?}, {unlike:?}");
+    }
+}
+
+/// A comparison is stored as a number.
+#[test]
+fn comparisons_of_the_rest_shape_are_stored() {
+    for (result, expected) in [
+        ("if long { k * L2 * norm(p) } else { 0 }", 12.0),
+        ("if short || !(long) { k } else { L2 * norm(p) }", 4.0),
+        ("(if long { norm(p) } else { k }) + (if short { 2 * norm(p) } else { k })", 4.0),
+    ] {
+        let result = result.replace("!(long)", "L2 < 1");
+        let source = format!(
+            "energy Chosen(p: Point; rest L: Scalar; k: Scalar) {{
+                rest {{ let long = L > 1; let short = L < 0.5; let L2 = L * L; let _both = long && short; }}
+                let _used = if short {{ k * L2 }} else {{ 0 }};
+                {result}
+            }}"
+        );
+        let element = Interpreted::from_source(&source).unwrap_or_else(|e| panic!("{source}\n{e}")).remove(0);
+        let inputs = Inputs { parameters: &[3.0], rest: &[2.0], positions: &[1.0, 0.0, 0.0], velocities: &[] };
+        let blocks = element.evaluate::<f64>(&inputs).expect("a sound rest shape").blocks;
+        assert_eq!(blocks[0].1, [expected], "{source}");
+    }
+}

@@ -80,6 +80,7 @@ fn what_does_not_fit_is_refused_with_the_expected_size() {
     assert!(text.starts_with("2 places for 3 numbers of the energies"), "{text}");
     let text = error(springs.residuals(0..3, &x, &mut e)).to_string();
     assert!(text.starts_with("Spring: no `residual` of this energy; it has value, gradient"), "{text}");
+    assert!(text.contains(" hessian") && !text.contains("reduced"), "{text}");
     // Coincident ends of a spring with a rest length have no direction.
     let flagged = springs.values(0..3, &x, &mut e).unwrap();
     assert!(flagged.is_empty() && e == [0.5; 3], "{flagged:?} {e:?}");

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use super::expression::{Checker, Meaning};
 use super::signature::Signature;
 use super::typed::{Binding, Typed, TypedKind};
+use super::vanishing::Vanishing;
 use crate::diagnostic::{Diagnostic, Diagnostics};
 use crate::functions::Shape;
 use crate::syntax::{Constant, Expression, Name};
@@ -14,6 +15,8 @@ use crate::syntax::{Constant, Expression, Name};
 pub(super) struct Globals {
     pub(super) bindings: Vec<Binding>,
     pub(super) scope: BTreeMap<String, Option<Meaning>>,
+    /// Names as written, by their canonical names.
+    pub(super) spellings: BTreeMap<String, String>,
 }
 
 impl Globals {
@@ -26,6 +29,7 @@ impl Globals {
             let mut checker = Checker::new(&signature, &globals, &[], diagnostics);
             let meaning = checker.constant(constant);
             globals.bindings = checker.bindings;
+            globals.spellings.insert(canonical.clone(), constant.name.text.clone());
             globals.scope.insert(canonical, meaning);
         }
         globals
@@ -105,8 +109,25 @@ pub(super) fn evaluate(bindings: &[Binding], typed: &Typed) -> Option<f64> {
 const LARGEST_EXPONENT: f64 = 1000.0;
 
 /// Describes why a function is undefined for constant arguments; `None` if it is defined or the arguments vary.
-pub(super) fn undefined(function: &str, arguments: &[Option<f64>]) -> Option<String> {
-    match (function, arguments) {
+pub(super) fn undefined(bindings: &[Binding], function: &str, arguments: &[Typed]) -> Option<String> {
+    let mut vanishing = Vanishing::new(bindings);
+    let written: Vec<_> = arguments.iter().map(|argument| evaluate(bindings, argument)).collect();
+    let mut number = |(argument, written): (&Typed, &Option<f64>)| {
+        let zero = matches!(function, "/" | "^" | "log") && vanishing.is_zero(argument);
+        written.or(zero.then_some(0.0))
+    };
+    let numbers: Vec<_> = arguments.iter().zip(&written).map(&mut number).collect();
+    match (function, numbers.as_slice()) {
+        ("*", [Some(x), None] | [None, Some(x)]) | ("/", [Some(x), None]) if x.is_infinite() => {
+            Some(format!("`{function}` with `infinity` has no value where the other number is 0"))
+        }
+        ("+" | "-" | "*" | "/", [Some(a), Some(b)]) if is_indeterminate(function, *a, *b) => {
+            let shown = |x: f64| x.to_string().replace("inf", "∞");
+            Some(format!("`{} {function} {}` is not a number", shown(*a), shown(*b)))
+        }
+        ("/", [_, Some(0.0)]) if written[1].is_none() => {
+            Some("a division by 0: the divisor is 0 for all inputs".into())
+        }
         ("/", [_, Some(0.0)]) => Some("a division by 0".into()),
         ("sqrt", [Some(x)]) if *x < 0.0 => Some(format!("the root of {x}, which is negative")),
         ("log", [Some(x)]) if *x <= 0.0 => Some(format!("the logarithm of {x}, which is not positive")),
@@ -122,6 +143,17 @@ pub(super) fn undefined(function: &str, arguments: &[Option<f64>]) -> Option<Str
         }
         _ => None,
     }
+}
+
+/// Returns whether an operation on numbers, one of them infinite, has no value.
+fn is_indeterminate(function: &str, a: f64, b: f64) -> bool {
+    let result = match function {
+        "+" => a + b,
+        "-" => a - b,
+        "*" => a * b,
+        _ => a / b,
+    };
+    (a.is_infinite() || b.is_infinite()) && result.is_nan()
 }
 
 /// Returns the constant outcome of a comparison; `None` if it is not constant.

@@ -1,11 +1,11 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::constant::Globals;
+use super::remedy;
 use super::signature::Signature;
 use super::typed::{Binding, Source, Typed, TypedKind};
-use crate::diagnostic::{Diagnostic, Diagnostics, Span, nearest};
+use crate::diagnostic::{Diagnostic, Diagnostics, Span};
 use crate::functions::{self, Shape};
-use crate::syntax::habits;
 use crate::syntax::{Body, Expression, ExpressionKind, Name, UserFunction, canonical, without_hat};
 
 /// Maximum number of calls of the text's functions in a formula. Each is inlined, and nested calls multiply.
@@ -26,11 +26,13 @@ pub(super) enum Meaning {
 /// are still checked.
 pub(super) struct Checker<'a> {
     signature: &'a Signature,
-    functions: Vec<&'a UserFunction>,
+    pub(super) functions: Vec<&'a UserFunction>,
     pub(super) diagnostics: &'a mut Diagnostics,
     /// Scopes: global constants, inputs, then bodies.
     pub(super) scopes: Vec<BTreeMap<String, Option<Meaning>>>,
     calls: Vec<String>,
+    /// Definitions as written, by their canonical names.
+    pub(super) spellings: BTreeMap<String, String>,
     /// Number of calls that were inlined.
     inlined: usize,
     used: BTreeSet<String>,
@@ -53,12 +55,15 @@ impl<'a> Checker<'a> {
             .iter()
             .map(|n| (n.name.canonical(), Some(Meaning::Input(n.source, n.first, n.shape, n.length))))
             .collect();
+        let written = signature.names.iter().map(|n| (n.name.canonical(), n.name.text.clone()));
+        let spellings = globals.spellings.clone().into_iter().chain(written).collect();
         Self {
             signature,
             functions: functions.to_vec(),
             diagnostics,
             scopes: vec![globals.scope.clone(), inputs],
             calls: Vec::new(),
+            spellings,
             inlined: 0,
             used: BTreeSet::new(),
             in_rest: false,
@@ -90,7 +95,7 @@ impl<'a> Checker<'a> {
         self.scopes.push(BTreeMap::new());
         for constant in &body.constants {
             let meaning = self.constant(constant);
-            self.scopes.last_mut().expect("compiler bug: no scope").insert(constant.name.canonical(), meaning);
+            self.enter(&constant.name, meaning);
         }
         for statement in &body.lets {
             if statement.rest && !outermost {
@@ -110,6 +115,12 @@ impl<'a> Checker<'a> {
 
     fn define(&mut self, name: &Name, value: Option<Typed>, rest: bool) {
         let meaning = value.map(|value| self.bind(value, rest));
+        self.enter(name, meaning);
+    }
+
+    /// Makes a name known in the innermost scope.
+    fn enter(&mut self, name: &Name, meaning: Option<Meaning>) {
+        self.spellings.insert(name.canonical(), name.text.clone());
         self.scopes.last_mut().expect("compiler bug: no scope").insert(name.canonical(), meaning);
     }
 
@@ -124,7 +135,7 @@ impl<'a> Checker<'a> {
         }
     }
 
-    fn find(&self, name: &str) -> Option<Option<Meaning>> {
+    pub(super) fn find(&self, name: &str) -> Option<Option<Meaning>> {
         let canonical = canonical(name);
         self.scopes.iter().rev().find_map(|scope| scope.get(&canonical).cloned())
     }
@@ -175,29 +186,20 @@ impl<'a> Checker<'a> {
             let meaning = found?;
             return self.meant(name, meaning);
         }
-        if matches!(name.text.as_str(), "π" | "pi" | "PI") {
-            return Some(Typed { kind: TypedKind::Pi, shape: Shape::Scalar, span: name.span.clone() });
+        match name.text.as_str() {
+            "π" | "pi" | "PI" => {
+                return Some(Typed { kind: TypedKind::Pi, shape: Shape::Scalar, span: name.span.clone() });
+            }
+            "infinity" => return Some(constant(f64::INFINITY, &name.span)),
+            _ => {}
         }
         // `â` is the unit vector of `a`. Among Rust tokens it is one identifier.
         if let Some(plain) = without_hat(&name.text).filter(|plain| self.find(plain).is_some()) {
             let vector = self.name(&Name { text: plain, span: name.span.clone() })?;
             return self.apply("unit", &name.span, vec![vector]);
         }
-        let known: Vec<String> = self.scopes.iter().flat_map(|s| s.keys().cloned()).collect();
-        let mut diagnostic = Diagnostic::new(&name.span, format!("unknown name `{}`", name.text));
-        let canonical = name.canonical();
-        let latin = habits::latin(&name.text).map(|latin| crate::syntax::canonical(&latin));
-        diagnostic = if let Some(latin) = latin.filter(|latin| known.contains(latin)) {
-            let declared = self.as_declared(&latin);
-            diagnostic.help(format!("some of its letters only look Latin; did you mean `{declared}`?"))
-        } else if functions::find(&name.text).is_some() {
-            diagnostic.help(format!("`{}` is a function: call it with its arguments in parentheses", name.text))
-        } else if let Some(near) = nearest(&canonical, known.iter().map(String::as_str)) {
-            diagnostic.help(format!("did you mean `{}`?", self.as_declared(near)))
-        } else {
-            diagnostic.help("declare it as an input, or define it with `let`")
-        };
-        self.diagnostics.push(diagnostic);
+        let remedy = self.remedy_for_name(&name.text);
+        self.diagnostics.push(Diagnostic::new(&name.span, format!("unknown name `{}`", name.text)).help(remedy));
         None
     }
 
@@ -218,11 +220,6 @@ impl<'a> Checker<'a> {
         let entries: Vec<_> = entries.into_iter().map(|entry| self.meant(name, entry)).collect::<Option<_>>()?;
         let length = u16::try_from(entries.len()).expect("arrays are short");
         Some(Typed { kind: TypedKind::Array(entries), shape: Shape::Array(length), span })
-    }
-
-    fn as_declared(&self, canonical: &str) -> String {
-        let declared = self.signature.names.iter().find(|n| n.name.canonical() == canonical);
-        declared.map_or_else(|| canonical.to_owned(), |n| n.name.text.clone())
     }
 
     fn input(&mut self, name: &Name, source: Source, first: usize, shape: Shape) -> Option<Typed> {
@@ -277,21 +274,8 @@ impl<'a> Checker<'a> {
 
     pub(super) fn apply(&mut self, name: &str, span: &Span, arguments: Vec<Typed>) -> Option<Typed> {
         let Some(function) = functions::find(name) else {
-            let mut diagnostic = Diagnostic::new(span, format!("unknown function `{name}`"));
-            diagnostic = if self.find(name).is_some() {
-                diagnostic.help(format!("`{name}` is a value; for a product write `{name} * (…)`"))
-            } else if let Some(here) = habits::function(name) {
-                diagnostic.help(format!("write {here}"))
-            } else if habits::is_mathematics(name) {
-                diagnostic.help(format!("define it: fn {name}(x) {{ … }}"))
-            } else {
-                let names = functions::all().map(|f| f.name).chain(self.functions.iter().map(|f| f.name.text.as_str()));
-                match nearest(name, names) {
-                    Some(near) => diagnostic.help(format!("did you mean `{near}`?")),
-                    None => diagnostic.help(format!("define it: fn {name}(…) {{ … }}")),
-                }
-            };
-            self.diagnostics.push(diagnostic);
+            let remedy = self.remedy_for_function(name);
+            self.diagnostics.push(Diagnostic::new(span, format!("unknown function `{name}`")).help(remedy));
             return None;
         };
         let shapes: Vec<Shape> = arguments.iter().map(|a| a.shape).collect();
@@ -306,18 +290,24 @@ impl<'a> Checker<'a> {
         }
         match (function.shape)(&shapes) {
             Ok(shape) => {
-                let constants: Vec<_> =
-                    arguments.iter().map(|a| super::constant::evaluate(&self.bindings, a)).collect();
-                if let Some(message) = super::constant::undefined(name, &constants) {
+                if let Some(message) = super::constant::undefined(&self.bindings, name, &arguments) {
                     return self.error(span, message);
+                }
+                if let "==" | "!=" = name
+                    && super::equality::is_measureless(&self.bindings, &arguments)
+                {
+                    let message = format!(
+                        "`{name}` of numbers that move: they are equal at single inputs only, and limits count there"
+                    );
+                    let help =
+                        "leave the comparison out, since limits are found without it; a region is abs(a - b) < c";
+                    self.diagnostics.push(Diagnostic::new(span, message).help(help));
+                    return None;
                 }
                 Some(Typed { kind: TypedKind::Call(function, arguments), shape, span: span.clone() })
             }
             Err(message) => {
-                let help = match (name, shapes.as_slice()) {
-                    ("abs", [Shape::Vector(_)]) => "the length of a vector is ‖v‖ or norm(v)".into(),
-                    _ => format!("usage: {}", function.usage),
-                };
+                let help = remedy::for_shapes(function, &shapes);
                 self.diagnostics.push(Diagnostic::new(span, format!("`{name}`: {message}")).help(help));
                 None
             }

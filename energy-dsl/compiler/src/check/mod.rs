@@ -4,12 +4,15 @@
 mod array;
 mod constant;
 mod domain;
+mod equality;
 mod expression;
 mod names;
+mod remedy;
 mod result;
 mod signature;
 mod typed;
 mod units;
+mod vanishing;
 
 pub use typed::{Binding, Input, Program, Source, Typed, TypedKind};
 pub use units::unit_exponents;

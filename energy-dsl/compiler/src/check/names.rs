@@ -8,7 +8,9 @@ use crate::syntax::{Body, Declaration, Expression, ExpressionKind, Item, Name, U
 
 /// Names that the language treats as functions although they are not in its table.
 const FORMS: [&str; 3] = ["gradient", "identity", "sum"];
-const PI: [&str; 3] = ["π", "pi", "PI"];
+/// Names of numbers, with what they name.
+const NUMBERS: [(&str, &str); 4] =
+    [("π", "the number π"), ("pi", "the number π"), ("PI", "the number π"), ("infinity", "an infinite value")];
 
 /// Reports names that are declared twice, and definitions that hide another name. Returns the definitions that nothing
 /// uses: they are errors only if there is no other error, which may be the reason.
@@ -179,8 +181,9 @@ impl<'a> Names<'a, '_> {
     fn report_hidden(&mut self, name: &Name, role: Role) {
         let text = &name.text;
         let function = functions::find(text).is_some() || FORMS.contains(&text.as_str());
-        let built_in = if function { "a function of the language" } else { "the number π" };
-        if role != Role::Variable && (function || PI.contains(&text.as_str())) {
+        let number = NUMBERS.iter().find(|(number, _)| number == text).map(|(_, meaning)| *meaning);
+        let built_in = if function { Some("a function of the language") } else { number };
+        if let Some(built_in) = built_in.filter(|_| role != Role::Variable) {
             let message = format!("`{text}` is {built_in} and cannot be defined again");
             self.diagnostics.push(Diagnostic::new(&name.span, message).help("choose another name"));
             return;

@@ -159,7 +159,7 @@ pub(super) fn recognise_one_minus_cosine(g: &mut Graph, one: NodeId, cosine: Nod
 }
 
 /// Creates 1 − â·b̂ of the vectors that the arguments list.
-fn one_minus_cosine(g: &mut Graph, arguments: Vec<NodeId>) -> NodeId {
+pub(super) fn one_minus_cosine(g: &mut Graph, arguments: Vec<NodeId>) -> NodeId {
     let at = aligned(g, &arguments[..3], &arguments[3..]);
     let (first, second) = cosine_derivatives(g, &at, true);
     let rule = Rule::factored(Primitive::OneMinusCosine, arguments, at.one_minus, first, second);

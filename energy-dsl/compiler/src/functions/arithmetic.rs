@@ -2,7 +2,7 @@
 
 use super::inner_product::inner_product;
 use super::{Function, Lowered, Shape};
-use crate::graph::{Form, Graph, NodeId, Op, Origin};
+use crate::graph::{Ending, Form, Graph, NodeId, Op, Origin};
 
 pub(super) const FUNCTIONS: &[Function] = &[
     Function {
@@ -104,8 +104,16 @@ fn by_parts(g: &mut Graph, args: &[Lowered], op: fn(&mut Graph, NodeId, NodeId) 
     Lowered { shape: args[0].shape, parts }
 }
 
+/// Returns the robust form of an operation on scalars that the user wrote.
+fn recognised(g: &mut Graph, ending: Ending, args: &[Lowered]) -> Option<Lowered> {
+    let [Lowered { shape: Shape::Scalar, parts: a }, Lowered { shape: Shape::Scalar, parts: b }] = args else {
+        return None;
+    };
+    g.recognised(ending, a[0], b[0]).map(Lowered::scalar)
+}
+
 fn add(g: &mut Graph, args: &[Lowered]) -> Lowered {
-    by_parts(g, args, Graph::add)
+    recognised(g, Ending::WrittenSum, args).unwrap_or_else(|| by_parts(g, args, Graph::add))
 }
 
 fn sub(g: &mut Graph, args: &[Lowered]) -> Lowered {
@@ -114,6 +122,9 @@ fn sub(g: &mut Graph, args: &[Lowered]) -> Lowered {
         && let Some(product) = recognise_squares(g, args[0].node(), args[1].node())
     {
         return Lowered::scalar(product);
+    }
+    if let Some(recognised) = recognised(g, Ending::WrittenDifference, args) {
+        return recognised;
     }
     let difference = by_parts(g, args, Graph::sub);
     if matches!(g.origin(&args[1].parts), Some(Origin::Rotation { matrix }) if *matrix == args[0].parts) {
@@ -150,6 +161,9 @@ fn neg(g: &mut Graph, args: &[Lowered]) -> Lowered {
 fn mul(g: &mut Graph, args: &[Lowered]) -> Lowered {
     let (a, b) = (&args[0], &args[1]);
     match (a.shape, b.shape) {
+        (Shape::Scalar, Shape::Scalar) if let Some(quotient) = over_power(g, a, b).or_else(|| over_power(g, b, a)) => {
+            quotient
+        }
         (Shape::Scalar, _) => scaled(g, a.node(), b),
         (_, Shape::Scalar) => scaled(g, b.node(), a),
         (Shape::Quat | Shape::DualQuat, _) => super::quaternion::product(g, a, b),
@@ -172,6 +186,16 @@ fn mul(g: &mut Graph, args: &[Lowered]) -> Lowered {
     }
 }
 
+/// Recognises a · x⁻ⁿ, which is a quotient.
+fn over_power(g: &mut Graph, a: &Lowered, power: &Lowered) -> Option<Lowered> {
+    match g.op(power.node()) {
+        Op::Div(one, below) if g.is(one, 1.0) => {
+            g.recognised(Ending::WrittenQuotient, a.node(), below).map(Lowered::scalar)
+        }
+        _ => None,
+    }
+}
+
 /// Returns factor · a.
 pub(super) fn scaled(g: &mut Graph, factor: NodeId, a: &Lowered) -> Lowered {
     let parts = super::quaternion::scaled_exponential(g, factor, &a.parts);
@@ -179,6 +203,9 @@ pub(super) fn scaled(g: &mut Graph, factor: NodeId, a: &Lowered) -> Lowered {
 }
 
 fn div(g: &mut Graph, args: &[Lowered]) -> Lowered {
+    if let Some(recognised) = recognised(g, Ending::WrittenQuotient, args) {
+        return recognised;
+    }
     let divisor = args[1].node();
     Lowered { shape: args[0].shape, parts: args[0].parts.iter().map(|&a| g.div(a, divisor)).collect() }
 }

@@ -197,7 +197,7 @@ pub(super) fn recognise_versine(g: &mut Graph, one: NodeId, cosine: NodeId) -> O
 }
 
 /// Creates 1 − cos x. The first derivative is sin x, the second cos x.
-fn versine(g: &mut Graph, x: NodeId) -> NodeId {
+pub(super) fn versine(g: &mut Graph, x: NodeId) -> NodeId {
     let cosine = g.cos(x);
     if g.form() == Form::Textbook {
         let one = g.constant(1.0);
@@ -212,7 +212,7 @@ fn versine(g: &mut Graph, x: NodeId) -> NodeId {
 }
 
 /// Creates x − sin x. The first derivative is 1 − cos x, the second sin x.
-fn sine_remainder(g: &mut Graph, x: NodeId) -> NodeId {
+pub(super) fn sine_remainder(g: &mut Graph, x: NodeId) -> NodeId {
     let sine = g.sin(x);
     let direct = g.sub(x, sine);
     if g.form() == Form::Textbook {

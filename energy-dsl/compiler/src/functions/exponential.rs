@@ -68,7 +68,7 @@ fn log(g: &mut Graph, x: NodeId) -> NodeId {
 
 /// Creates ln(1 + x) as ln(u) x/(u − 1), where u = 1 + x is rounded: the errors of logarithm and quotient cancel. If u
 /// is exact, it is ln u.
-fn log1p(g: &mut Graph, x: NodeId) -> NodeId {
+pub(super) fn log1p(g: &mut Graph, x: NodeId) -> NodeId {
     let one = g.constant(1.0);
     let u = g.add(one, x);
     let direct = g.ln(u);
@@ -126,7 +126,7 @@ fn log1p_of(g: &mut Graph, x: NodeId, u: NodeId) -> NodeId {
 }
 
 /// Creates ln(1 + x) − x.
-fn log1pmx(g: &mut Graph, x: NodeId) -> NodeId {
+pub(super) fn log1pmx(g: &mut Graph, x: NodeId) -> NodeId {
     let (one, logarithm) = (g.constant(1.0), log1p(g, x));
     let u = g.add(one, x);
     let direct = g.sub(logarithm, x);
@@ -181,9 +181,7 @@ fn log1pmx_near_0(g: &mut Graph, x: NodeId) -> NodeId {
 /// Creates eˣ − 1. For |x| < 1 it is (u − 1) x/ln u with u = eˣ rounded: the errors cancel.
 pub(super) fn expm1(g: &mut Graph, x: NodeId) -> NodeId {
     let u = g.exp(x);
-    // Plain addition: `sub` would be recognised as this function again.
-    let minus_one = g.constant(-1.0);
-    let plain = g.add(u, minus_one);
+    let plain = plain_expm1(g, u);
     if g.form() == Form::Textbook {
         return plain;
     }
@@ -194,6 +192,12 @@ pub(super) fn expm1(g: &mut Graph, x: NodeId) -> NodeId {
     let value = g.select(tiny, x, corrected);
     let value = g.select(moderate, value, plain);
     g.add_rule(Rule::smooth(Primitive::Expm1, vec![x], value, vec![u], vec![u]), &[])
+}
+
+/// Creates u − 1 for u = eˣ. `sub` would recognise it as `expm1` again.
+pub(super) fn plain_expm1(g: &mut Graph, u: NodeId) -> NodeId {
+    let minus_one = g.constant(-1.0);
+    g.add(u, minus_one)
 }
 
 /// Recognises eˣ − 1 and 1 − eˣ.

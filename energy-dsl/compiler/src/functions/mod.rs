@@ -3,6 +3,7 @@
 
 mod angle;
 mod arithmetic;
+mod decisive;
 mod dihedral;
 mod elementary;
 mod error_function;
@@ -10,12 +11,14 @@ mod exponential;
 mod hyperbolic;
 mod inner_product;
 mod length;
+mod lengths;
 mod linear_algebra;
 mod logic;
 mod loss;
 mod parallelogram;
 mod polar;
 mod quaternion;
+mod remainder;
 mod rotated;
 mod shape;
 mod sinc;
@@ -105,6 +108,30 @@ pub const RECOGNISERS: &[Recogniser] = &[
         recognise: angle::recognise_one_plus_cosine,
     },
     Recogniser {
+        spelling: "norm(a) * norm(b) + dot(a, b)",
+        form: "2 ‖a‖‖b‖ cos²(φ/2) of the angle φ between a and b",
+        ending: Ending::WrittenSum,
+        recognise: lengths::recognise_lengths_plus_dot,
+    },
+    Recogniser {
+        spelling: "norm(a) * norm(b) - dot(a, b)",
+        form: "2 ‖a‖‖b‖ sin²(φ/2) of the angle φ between a and b",
+        ending: Ending::WrittenDifference,
+        recognise: lengths::recognise_lengths_minus_dot,
+    },
+    Recogniser {
+        spelling: "1 + dot(a, b) / (norm(a) * norm(b))",
+        form: "2 cos²(φ/2) of the angle φ between a and b",
+        ending: Ending::WrittenSum,
+        recognise: lengths::recognise_one_plus_quotient,
+    },
+    Recogniser {
+        spelling: "1 - dot(a, b) / (norm(a) * norm(b))",
+        form: "2 sin²(φ/2) of the angle φ between a and b",
+        ending: Ending::WrittenDifference,
+        recognise: lengths::recognise_one_minus_quotient,
+    },
+    Recogniser {
         spelling: "norm(d) - L",
         form: "the elongation, accurate near rest; so is its \
         square",
@@ -163,6 +190,24 @@ pub const RECOGNISERS: &[Recogniser] = &[
             without the angle",
         ending: Ending::Cosine,
         recognise: dihedral::recognise_cosine,
+    },
+    Recogniser {
+        spelling: "exp(x) - 1 - x, sin(x) - x, x - log(1 + x), …",
+        form: "the rest of the Taylor series at 0",
+        ending: Ending::WrittenDifference,
+        recognise: remainder::recognise_difference,
+    },
+    Recogniser {
+        spelling: "cos(x) - 1 + x^2/2, -sin(x) + x, …",
+        form: "the rest of the Taylor series at 0",
+        ending: Ending::WrittenSum,
+        recognise: remainder::recognise_sum,
+    },
+    Recogniser {
+        spelling: "(exp(x) - 1 - x) / x^2, sin(x) / x, log(1 + x) / x, …",
+        form: "the rest of the Taylor series over a power of x, regular at 0",
+        ending: Ending::WrittenQuotient,
+        recognise: remainder::recognise_quotient,
     },
     Recogniser {
         spelling: "norm(d)^α",

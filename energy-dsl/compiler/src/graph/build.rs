@@ -65,7 +65,7 @@ impl Graph {
     }
 
     /// Returns the node without its leading minus sign, and whether it had one.
-    pub(super) fn magnitude(&self, node: NodeId) -> (NodeId, bool) {
+    pub(crate) fn magnitude(&self, node: NodeId) -> (NodeId, bool) {
         match self.op(node) {
             Op::Neg(a) => (a, true),
             _ => (node, false),

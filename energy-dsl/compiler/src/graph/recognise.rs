@@ -19,6 +19,12 @@ pub enum Ending {
     Cosine,
     /// a^b.
     Power,
+    /// a + b of a formula as written, not inside of primitives and derivatives.
+    WrittenSum,
+    /// a − b of a formula as written.
+    WrittenDifference,
+    /// a / b of a formula as written.
+    WrittenQuotient,
 }
 
 /// A naive spelling and its robust form.
@@ -35,9 +41,20 @@ pub struct Recogniser {
     pub recognise: fn(&mut Graph, NodeId, NodeId) -> Option<NodeId>,
 }
 
+/// A family of functions whose Taylor series have remainders as primitives; see `functions/remainder`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Expansion {
+    /// eˣ.
+    Exponential,
+    /// ln(1 + x).
+    Logarithm,
+    /// sin x and cos x.
+    Trigonometric,
+}
+
 impl Graph {
     /// Returns the robust form of an operation, by the first matching recogniser.
-    pub(super) fn recognised(&mut self, ending: Ending, a: NodeId, b: NodeId) -> Option<NodeId> {
+    pub(crate) fn recognised(&mut self, ending: Ending, a: NodeId, b: NodeId) -> Option<NodeId> {
         let recognisers = self.recognisers;
         recognisers.iter().filter(|row| row.ending == ending).find_map(|row| (row.recognise)(self, a, b))
     }

@@ -1,5 +1,5 @@
 use super::node::NodeId;
-use super::{Graph, Op};
+use super::{Expansion, Graph, Op};
 use energy_runtime::Flag;
 
 /// A robust primitive of the language. Each component of a vector-valued one is a primitive.
@@ -41,6 +41,8 @@ pub enum Primitive {
     Versine,
     /// x − sin x.
     SineRemainder,
+    /// A remainder of a Taylor series, xᵖ Φₖ(x): the family, k and p. (eˣ − 1 − x)/x² has k = 2 and p = 0.
+    Remainder(Expansion, u8, u8),
     /// cos √y.
     CosSqrt,
     /// sin √y / √y.
@@ -127,6 +129,7 @@ impl Primitive {
             Self::DihedralSineDifference => "sin θ/2 − sin θ₀/2 of a dihedral angle",
             Self::Versine => "1 − cos x",
             Self::SineRemainder => "x − sin x",
+            Self::Remainder(..) => "remainder of a Taylor series",
             Self::ReciprocalNorm => "reciprocal norm 1/‖d‖",
             Self::CosSqrt => "cos √y",
             Self::SincSqrt => "sin √y / √y",

@@ -55,6 +55,7 @@ fn expression(of: &Expression, least: u8) -> String {
 fn parts(of: &Expression) -> (String, u8) {
     match &of.kind {
         ExpressionKind::Number(value) => (format!("<mn>{value}</mn>"), 5),
+        ExpressionKind::Name(name) if name.text == "infinity" => ("<mn>∞</mn>".into(), 5),
         ExpressionKind::Name(name) => (identifier(&name.text), 5),
         ExpressionKind::Call(name, arguments) => call(&name.text, arguments),
         ExpressionKind::If(condition, yes, no) => {
@@ -153,6 +154,7 @@ mod tests {
             assert!(text.contains(part), "no {part} in {text}");
         }
         assert_eq!(text.matches("<mtr>").count(), 2);
+        assert!(mathml("energy E(p: Point) { max(p.x, infinity) }").unwrap().contains("<mn>∞</mn>"));
         assert!(mathml("energy E(").is_none());
     }
 }

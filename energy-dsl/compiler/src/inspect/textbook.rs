@@ -169,16 +169,23 @@ impl<T: Number> TowerInputs<T> {
 /// Everything that is wrong with it.
 pub fn programs(source: &str) -> Result<Vec<Program>, Diagnostics> {
     let mut diagnostics = Diagnostics::default();
-    let stream: TokenStream = source.parse().map_err(|error| {
-        let here = Span::of(proc_macro2::Span::call_site());
-        Diagnostics::from(
-            Diagnostic::new(&here, format!("the text does not split into tokens: {error}"))
-                .help("put mathematical notation in a string: \"‖p − q‖ − L\""),
-        )
-    })?;
+    let stream: TokenStream = source.parse().map_err(|_| not_tokens(source))?;
     let items = parse(stream, &mut diagnostics);
     let programs = check(&items, &mut diagnostics);
     diagnostics.finish(programs)
+}
+
+/// Describes why a text is not tokens of Rust: by the characters that are no tokens, or else by its strings.
+fn not_tokens(source: &str) -> Diagnostics {
+    let mut diagnostics = Diagnostics::default();
+    let here = Span::of(proc_macro2::Span::call_site());
+    parse_file(source, "text", &here, &mut diagnostics);
+    if diagnostics.0.is_empty() {
+        let message = "the text does not split into tokens of Rust";
+        let help = "in Rust code, write a backslash in a string twice, as in \"\\\\theta\", and balance all brackets";
+        diagnostics.push(Diagnostic::new(&here, message).help(help));
+    }
+    diagnostics
 }
 
 /// Parses and checks the text of a file, where mathematical notation is in strings without escapes. Messages name the

@@ -36,7 +36,9 @@ impl fmt::Display for EvaluateError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Routine { declaration, routine } => {
-                let names: Vec<&str> = declaration.routines.iter().map(|routine| routine.name).collect();
+                // Hessians are computed in reduced coordinates; callers ask for `hessian`.
+                let asked = |name: &'static str| if name == "reduced_hessian" { "hessian" } else { name };
+                let names: Vec<&str> = declaration.routines.iter().map(|routine| asked(routine.name)).collect();
                 let (name, kind) = (declaration.name, declaration.kind.keyword());
                 write!(f, "{name}: no `{routine}` of this {kind}; it has {}", names.join(", "))
             }

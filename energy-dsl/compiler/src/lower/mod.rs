@@ -1,5 +1,7 @@
 //! Lowers typed programs to scalar graphs.
 
+#[cfg(test)]
+mod fuzz;
 mod parts;
 mod repeated;
 mod rest;
@@ -70,7 +72,7 @@ fn stored(rest: &mut Lowering<'_>, bindings: impl IntoIterator<Item = usize>) ->
     let mut slots = BTreeMap::new();
     for binding in bindings {
         slots.insert(binding, outputs.len());
-        outputs.extend(rest.binding(binding).parts);
+        outputs.extend(rest.numbers(binding));
     }
     (outputs, slots)
 }
@@ -90,7 +92,7 @@ fn repeated(sum: &LikeTerms, rest: &mut Lowering<'_>) -> (Vec<NodeId>, Formula) 
     }
     let stride = each.iter().map(|(binding, _)| size(*binding)).sum();
     for number in 0..*terms {
-        outputs.extend(each.iter().flat_map(|(_, of)| rest.binding(of[number]).parts));
+        outputs.extend(each.iter().flat_map(|(_, of)| rest.numbers(of[number])));
     }
     let row = |number: usize| constants.iter().flat_map(|(_, rows)| rows[number].clone()).collect();
     let table = (0..*terms).map(row).collect();
@@ -191,11 +193,36 @@ impl<'a> Lowering<'a> {
         let binding = &self.program.bindings[number];
         let slot = self.slots.as_ref().filter(|_| binding.rest).map(|slots| slots[&number]);
         let value = match slot {
-            Some(slot) => self.inputs(binding.value.shape, slot, Input::Precomputed),
+            Some(slot) => self.stored(binding.value.shape, slot),
             None => self.expression(&binding.value),
         };
         self.done.insert(number, value.clone());
         value
+    }
+
+    /// Returns the numbers to store for a binding. A truth value is stored as 1 or 0.
+    fn numbers(&mut self, binding: usize) -> Vec<NodeId> {
+        let Lowered { shape, parts } = self.binding(binding);
+        match shape {
+            Shape::Truth => {
+                let (one, zero) = (self.graph.constant(1.0), self.graph.constant(0.0));
+                vec![self.graph.select(parts[0], one, zero)]
+            }
+            _ => parts,
+        }
+    }
+
+    /// Reads a stored binding.
+    fn stored(&mut self, shape: Shape, slot: usize) -> Lowered {
+        let numbers = self.inputs(shape, slot, Input::Precomputed);
+        match shape {
+            Shape::Truth => {
+                let zero = self.graph.constant(0.0);
+                let is_zero = self.graph.equal(numbers.node(), zero);
+                Lowered::truth(self.graph.not(is_zero))
+            }
+            _ => numbers,
+        }
     }
 
     fn expression(&mut self, expression: &Typed) -> Lowered {

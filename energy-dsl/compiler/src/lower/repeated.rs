@@ -152,9 +152,25 @@ impl<'a> Unifier<'a> {
             return None;
         }
         let count = first.parts().len();
-        let unified: Vec<Typed> = (0..count).map(|number| self.unified(&part(number))).collect::<Option<_>>()?;
+        let unified: Vec<Typed> = (0..count)
+            .map(|number| match &first.kind {
+                TypedKind::Call(function, _) if function.is_decided_by(number) => self.decisive(&part(number)),
+                _ => self.unified(&part(number)),
+            })
+            .collect::<Option<_>>()?;
         let mut unified = unified.into_iter();
         Some(first.map_parts(|_| unified.next().expect("compiler bug: as many parts")))
+    }
+
+    /// Returns an argument that decides the operations of the call. If it is constant in one term, it must be the same
+    /// constant in all.
+    fn decisive(&mut self, terms: &[&Typed]) -> Option<Typed> {
+        let numbers: Vec<_> = terms.iter().map(|term| self.literal(term)).collect();
+        match &numbers[0] {
+            Some(_) => numbers.iter().all(|other| *other == numbers[0]).then(|| terms[0].clone()),
+            None if numbers.iter().any(Option::is_some) => None,
+            None => self.unified(terms),
+        }
     }
 
     /// Returns the numbers of an expression without inputs.
@@ -183,7 +199,10 @@ impl<'a> Unifier<'a> {
         if numbers.iter().all(|row| *row == numbers[0]) {
             return first.clone();
         }
-        let known = self.constants.iter().find(|(_, rows)| *rows == numbers).map(|(number, _)| *number);
+        // A vector and a quaternion may have the same numbers.
+        let shape = |binding: usize| self.bindings[binding].value.shape;
+        let mut known = self.constants.iter().filter(|(number, _)| shape(*number) == first.shape);
+        let known = known.find(|(_, rows)| *rows == numbers).map(|(number, _)| *number);
         let number = known.unwrap_or_else(|| {
             let number = self.add(first.clone(), true);
             self.constants.push((number, numbers));

@@ -20,6 +20,11 @@ impl Parser<'_> {
     /// Parses an attribute after its `#`: `[doc = "…"]`, `[audit]`, `[audit(samples = n, …)]`, `[invariant(translation,
     /// rotation)]`, `[rest_state(zero_force)]`, `[even]` or `[uncompensated]`.
     pub(super) fn attribute(&mut self, attributes: &mut Attributes) -> Parsed<()> {
+        if self.fault().is_none() && !self.is("[") {
+            let comment =
+                Diagnostic::new(&self.span(), format!("expected an attribute after `#`, found {}", self.found()));
+            return Err(Box::new(comment.help("write #[audit], or begin a comment with `//`")));
+        }
         self.expect("[", "to open the attribute")?;
         let name = self.name("`doc`, `audit` or a property")?;
         match name.text.as_str() {

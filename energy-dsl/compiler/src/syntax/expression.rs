@@ -150,7 +150,7 @@ impl<'a> Parser<'a> {
                 return Err(Box::new(Diagnostic::new(&span, message).help(help)));
             }
             TokenKind::Name(_) => return self.name_or_call(),
-            TokenKind::Text(_) => return self.fail("a value"),
+            TokenKind::Text(_) | TokenKind::Broken(_) => return self.fail("a value"),
             TokenKind::Symbol(symbol) => match symbol.as_str() {
                 "(" => {
                     self.at += 1;
@@ -196,6 +196,9 @@ impl<'a> Parser<'a> {
 
     /// Expects a closing bracket, and names the place of the opening one if it is missing.
     fn close(&mut self, open: &str, close: &str, opened: Span) -> Parsed<()> {
+        if let Some(fault) = self.fault() {
+            return Err(fault);
+        }
         let closed = self.expect(close, &format!("to close `{open}`"));
         closed.map_err(|error| Box::new(error.see((format!("`{open}` is opened"), opened))))
     }
@@ -208,6 +211,9 @@ impl<'a> Parser<'a> {
         while !self.is(close) {
             items.push(self.expression()?);
             if !self.take(",") && !self.is(close) {
+                if let Some(fault) = self.fault() {
+                    return Err(fault);
+                }
                 let error: Parsed<()> = self.fail(&format!("`,` or `{close}`"));
                 let opened = (format!("`{open}` is opened"), opened);
                 return error.map_err(|error| Box::new(error.see(opened))).map(|()| items);
@@ -225,6 +231,9 @@ impl<'a> Parser<'a> {
         self.bars.push(bar.into());
         let inner = self.expression()?;
         self.bars.pop();
+        if let Some(fault) = self.fault() {
+            return Err(fault);
+        }
         if !self.take(bar) {
             let message = format!("unbalanced `{bar}`: expected a second `{bar}`, found {}", self.found());
             return Err(Box::new(Diagnostic::new(&span, message).help(format!("close it, as in {bar}d{bar}"))));

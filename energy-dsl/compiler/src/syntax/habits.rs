@@ -42,6 +42,50 @@ const FUNCTIONS: &[(&str, &str)] = &[
     ("vec2", "vector(x, y)"),
     ("vec3", "vector(x, y, z)"),
     ("grad", "gradient(U, p)"),
+    ("nabla", "gradient(U, p)"),
+    ("derivative", "gradient(U, p)"),
+    ("distance", "norm(p - q)"),
+    ("dist", "norm(p - q)"),
+    ("unit_vector", "unit(v)"),
+    ("normed", "unit(v)"),
+    ("exponential", "exp(x)"),
+    ("logarithm", "log(x)"),
+    ("root", "sqrt(x)"),
+    ("absolute", "abs(x)"),
+    ("minimum", "min(a, b)"),
+    ("maximum", "max(a, b)"),
+    ("relu", "max(x, 0)"),
+    ("saturate", "clamp(x, 0, 1)"),
+    ("sgn", "sign(x)"),
+    ("signum", "sign(x)"),
+    ("invert", "inverse(M)"),
+    ("eye", "identity(3)"),
+    ("double_dot", "ddot(A, B)"),
+    ("contract", "ddot(A, B)"),
+    ("tensor_product", "outer(a, b)"),
+    ("svd", "singular_values(F)"),
+    ("polar", "rotation_of(F)"),
+    ("vec4", "vector(x, y, z, w)"),
+    ("mat2", "columns(a, b)"),
+    ("mat3", "columns(a, b, c)"),
+    ("matrix", "columns(a, b, c)"),
+    ("dihedral_angle", "dihedral(x1, x2, x3, x4)"),
+];
+
+/// Names of numbers elsewhere, and what is written here.
+const NUMBERS: &[(&str, &str)] = &[
+    ("e", "exp(x) for eˣ, as in exp(-r^2), and exp(1) for the number e"),
+    ("tau", "2 * π"),
+    ("τ", "2 * π"),
+    ("inf", "infinity"),
+    ("Inf", "infinity"),
+    ("INF", "infinity"),
+    ("Infinity", "infinity"),
+    ("INFINITY", "infinity"),
+    ("oo", "infinity"),
+    ("Pi", "π or pi"),
+    ("true", "a comparison, as in a < b"),
+    ("false", "a comparison, as in a < b"),
 ];
 
 /// Functions of mathematics whose names must not be taken for misspellings of others.
@@ -51,6 +95,16 @@ const MATHEMATICS: &[&str] =
 /// Returns what is written here for a function of another language.
 pub(crate) fn function(name: &str) -> Option<&'static str> {
     FUNCTIONS.iter().find(|(elsewhere, _)| *elsewhere == name).map(|(_, here)| *here)
+}
+
+/// Returns what is written here for a number of another language.
+pub(crate) fn number(name: &str) -> Option<&'static str> {
+    NUMBERS.iter().find(|(elsewhere, _)| *elsewhere == name).map(|(_, here)| *here)
+}
+
+/// Returns the names of functions in other languages.
+pub(crate) fn functions_elsewhere() -> impl Iterator<Item = &'static str> {
+    FUNCTIONS.iter().map(|(elsewhere, _)| *elsewhere).filter(|name| name.len() > 3)
 }
 
 /// Whether a name means something in mathematics, so that it is not a misspelling.
@@ -78,19 +132,12 @@ pub(super) fn symbol(symbol: &str) -> Option<&'static str> {
     match symbol {
         "?" => Some("write if c { a } else { b } for c ? a : b"),
         "*" => Some("a power is written x^2"),
+        "#" => Some("comments begin with `//`"),
+        "=" => Some("compare with `==`, and define a name with `let name = …;`"),
         "!" => Some("write the opposite comparison, as in a >= b for !(a < b)"),
         "&" | "%" => Some("formulas have + - * / ^, comparisons, && and ||"),
         _ => None,
     }
-}
-
-/// Returns the Latin letters that look like the letters of a name, if some are not Latin: `p` for the Cyrillic `р`.
-pub(crate) fn latin(name: &str) -> Option<String> {
-    const PAIRS: &str = "аaеeоoрpсcуyхxіiјjѕsкkоoԁdһhԛqԝwАAВBЕEКKМMНHОOРPСCТTХXУYІIЈJЅSοoΟOΑAΒBΕEΖZΗHΙIΚKΜMΝNΡPΤTΥYΧX";
-    let letters: Vec<char> = PAIRS.chars().collect();
-    let look_alike = |c: char| letters.chunks_exact(2).find(|pair| pair[0] == c).map(|pair| pair[1]);
-    let latin: String = name.chars().map(|c| look_alike(c).unwrap_or(c)).collect();
-    (latin != name).then_some(latin)
 }
 
 #[cfg(test)]
@@ -106,11 +153,5 @@ mod tests {
             assert!(known, "{elsewhere} → {here}");
             assert!(functions::find(elsewhere).is_none(), "{elsewhere} exists");
         }
-    }
-
-    #[test]
-    fn look_alikes_are_recognised() {
-        assert_eq!(latin("р_k").as_deref(), Some("p_k"));
-        assert_eq!(latin("p_k"), None);
     }
 }

@@ -2,6 +2,7 @@
 
 mod ast;
 mod attribute;
+pub(crate) mod characters;
 mod expression;
 pub(crate) mod habits;
 mod name;

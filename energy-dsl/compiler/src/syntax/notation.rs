@@ -2,36 +2,36 @@
 
 use std::rc::Rc;
 
+use super::characters;
 use super::name::GREEK;
-use super::tokens::{Kind, Token};
-use crate::diagnostic::{Diagnostic, Diagnostics, Excerpt, Span};
+use super::tokens::{self, Kind, Token};
+use crate::diagnostic::{Diagnostic, Excerpt, Span, nearest};
 
 /// Splits a formula into tokens. `literal` is the place of the string.
-pub(super) fn tokens(text: &str, literal: &Span, diagnostics: &mut Diagnostics) -> Vec<Token> {
+pub(super) fn tokens(text: &str, literal: &Span) -> Vec<Token> {
     let excerpt = Excerpt { text: text.into(), start: 0, end: 0, file: None };
     let whole = Span { token: literal.token, excerpt: Some(excerpt.clone()) };
-    tokens_within(&excerpt.text, (0, text.len()), &whole, diagnostics)
+    tokens_within(&excerpt.text, (0, text.len()), &whole)
 }
 
 /// Splits the formula between two places of the text `whole` into tokens.
-pub(super) fn tokens_within(
-    text: &Rc<str>,
-    (start, end): (usize, usize),
-    whole: &Span,
-    diagnostics: &mut Diagnostics,
-) -> Vec<Token> {
+pub(super) fn tokens_within(text: &Rc<str>, (start, end): (usize, usize), whole: &Span) -> Vec<Token> {
     let mut lexer = Lexer { text: text.clone(), at: start, end, whole, tokens: Vec::new() };
     while let Some(c) = lexer.peek() {
         let start = lexer.at;
-        if let Err(message) = lexer.token(c) {
-            diagnostics.push(Diagnostic::new(&lexer.span(start), message));
+        if let Err((message, help)) = lexer.token(c) {
+            let error = Diagnostic { help, ..Diagnostic::new(&lexer.span(start), message) };
             if lexer.at == start {
                 lexer.advance();
             }
+            lexer.push(error.into(), start);
         }
     }
     lexer.tokens
 }
+
+/// A message, and the remedy; `None` if there is none.
+type Complaint = (String, Option<String>);
 
 struct Lexer<'a> {
     text: Rc<str>,
@@ -66,10 +66,11 @@ impl Lexer<'_> {
         self.push(Kind::Symbol(symbol.into()), start);
     }
 
-    fn token(&mut self, c: char) -> Result<(), String> {
+    fn token(&mut self, c: char) -> Result<(), Complaint> {
         let start = self.at;
         if c.is_ascii_digit() {
-            return self.number();
+            self.number();
+            return Ok(());
         }
         if c == '\\' {
             return self.command();
@@ -97,6 +98,7 @@ impl Lexer<'_> {
             '⅔' => self.push(Kind::Number(2.0 / 3.0), start),
             '⅛' => self.push(Kind::Number(0.125), start),
             'ᵀ' => self.symbol("ᵀ", start),
+            '∞' => self.push(Kind::Name("infinity".into()), start),
             '√' | '‖' | '|' | '+' | '-' | '*' | '/' | '^' | '(' | ')' | '[' | ']' | '{' | '}' | ',' | ';' | ':'
             | '=' | '<' | '>' | '!' | '&' | '.' => {
                 let mut symbol = c.to_string();
@@ -115,18 +117,16 @@ impl Lexer<'_> {
                     digits.push(superscript(next));
                     self.advance();
                 }
-                let power = digits.parse().map_err(|_| format!("`{digits}` is not a superscript number"))?;
+                let power = digits.parse().map_err(|_| (format!("`{digits}` is not a superscript number"), None))?;
                 self.symbol("^", start);
                 self.push(Kind::Number(power), start);
             }
-            other => {
-                return Err(format!("the character `{other}` has no meaning in a formula"));
-            }
+            other => return Err(characters::misplaced(other)),
         }
         Ok(())
     }
 
-    fn number(&mut self) -> Result<(), String> {
+    fn number(&mut self) {
         let start = self.at;
         let rest = &self.text[start..self.end];
         let mut end = rest.find(|c: char| !c.is_ascii_digit() && c != '.').unwrap_or(rest.len());
@@ -142,14 +142,12 @@ impl Lexer<'_> {
             }
         }
         self.at += end;
-        let text = &self.text[start..self.at];
-        let value = text.parse().map_err(|_| format!("`{text}` is not a number"))?;
-        self.push(Kind::Number(value), start);
-        Ok(())
+        let number = tokens::number(&self.text[start..self.at], &self.span(start));
+        self.push(number, start);
     }
 
     /// Reads a LaTeX command: `\hat a`, `\cdot`, `\times`, `\theta`, ….
-    fn command(&mut self) -> Result<(), String> {
+    fn command(&mut self) -> Result<(), Complaint> {
         let start = self.at;
         self.advance();
         let name_start = self.at;
@@ -165,7 +163,7 @@ impl Lexer<'_> {
                     self.advance();
                 }
                 if !self.peek().is_some_and(is_name_start) {
-                    return Err("expected the name of a vector after \\hat".into());
+                    return Err(("expected the name of a vector after \\hat".into(), None));
                 }
                 self.symbol("hat", start);
                 self.name(braced);
@@ -192,7 +190,9 @@ impl Lexer<'_> {
                     }
                     self.push(Kind::Name(name), start);
                 }
-                None => return Err(format!("the command \\{other} has no meaning in a formula")),
+                None => {
+                    return Err((format!("the command \\{other} has no meaning in a formula"), near_command(other)));
+                }
             },
         }
         Ok(())
@@ -229,6 +229,14 @@ impl Lexer<'_> {
         }
         self.push(Kind::Name(name), start);
     }
+}
+
+/// Returns a remedy that names the command which `command` is probably a misspelling of.
+fn near_command(command: &str) -> Option<String> {
+    const COMMANDS: &[&str] = &["hat", "cdot", "times", "otimes", "frac", "sqrt", "lVert", "rVert", "le", "ge", "pi"];
+    let functions = crate::functions::all().map(|function| function.name);
+    let known = COMMANDS.iter().copied().chain(GREEK.iter().map(|(_, name)| *name)).chain(functions);
+    nearest(command, known).map(|near| format!("did you mean \\{near}?"))
 }
 
 /// Returns the name below a hat: `p` of `p̂`. `None` if the name has no hat.
@@ -282,7 +290,7 @@ fn unhatted(c: char) -> Option<char> {
 }
 
 fn is_name_start(c: char) -> bool {
-    (c.is_alphabetic() && !"ᵀᐧ".contains(c)) || c == '_'
+    (c.is_alphabetic() && !"ᵀᐧ".contains(c) && characters::halfwidth(c).is_none()) || c == '_'
 }
 
 fn is_name_part(c: char) -> bool {

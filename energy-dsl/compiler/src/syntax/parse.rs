@@ -17,13 +17,13 @@ use energy_runtime::Kind;
 
 /// Parses all items. After an error in one item, parsing continues with the next.
 pub fn parse(stream: TokenStream, diagnostics: &mut Diagnostics) -> Vec<Item> {
-    let tokens = tokens::from_rust(stream, diagnostics);
+    let tokens = tokens::from_rust(stream);
     items(&tokens, diagnostics)
 }
 
 /// Parses the text of a file. `at` is the place in Rust code that names the file.
 pub fn parse_file(text: &str, file: &str, at: &Span, diagnostics: &mut Diagnostics) -> Vec<Item> {
-    let tokens = text::tokens(text, file, at, diagnostics);
+    let tokens = text::tokens(text, file, at);
     items(&tokens, diagnostics)
 }
 
@@ -119,7 +119,18 @@ impl<'a> Parser<'a> {
         }
     }
 
+    /// Returns the error of the next token if its characters are no token.
+    pub(super) fn fault(&self) -> Option<Box<Diagnostic>> {
+        match &self.peek()?.kind {
+            TokenKind::Broken(fault) => Some(fault.0.clone()),
+            _ => None,
+        }
+    }
+
     pub(super) fn fail<T>(&self, expected: &str) -> Parsed<T> {
+        if let Some(fault) = self.fault() {
+            return Err(fault);
+        }
         let diagnostic = Diagnostic::new(&self.span(), format!("expected {expected}, found {}", self.found()));
         Err(Box::new(match self.remedy() {
             Some(remedy) => diagnostic.help(remedy),
@@ -288,6 +299,9 @@ impl<'a> Parser<'a> {
     }
 
     fn kind(&mut self) -> Parsed<Kind> {
+        if let Some(fault) = self.fault() {
+            return Err(fault);
+        }
         if let Some(kind) = KINDS.into_iter().find(|k| self.is_word(k.keyword())) {
             self.at += 1;
             return Ok(kind);
@@ -457,6 +471,13 @@ impl<'a> Parser<'a> {
         if (braced && self.is("}")) || self.peek().is_none() {
             return self.fail("the result of the body, an expression without `;`");
         }
+        if braced && self.next_is_definition() {
+            let name = self.found();
+            let message = format!("expected `let` before the definition of {name}");
+            return Err(Box::new(
+                Diagnostic::new(&self.span(), message).help(format!("write let {} = …;", name.trim_matches('`'))),
+            ));
+        }
         let result = self.expression()?;
         if self.is(";") {
             return Err(Box::new(
@@ -489,9 +510,10 @@ impl<'a> Parser<'a> {
     }
 }
 
+/// Returns the section of an input. Velocities are those of the moving points, wherever they are declared.
 fn section_of(section: Section, element: ElementType) -> Section {
     match element {
-        ElementType::Point | ElementType::Velocity => Section::Moving,
+        ElementType::Velocity => Section::Moving,
         _ => section,
     }
 }

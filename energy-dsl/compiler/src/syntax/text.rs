@@ -2,16 +2,15 @@
 
 use std::rc::Rc;
 
-use super::notation;
 use super::tokens::{Kind, OPERATORS, Token, literal_kind};
-use crate::diagnostic::{Diagnostic, Diagnostics, Excerpt, Span};
+use super::{characters, notation};
+use crate::diagnostic::{Diagnostic, Excerpt, Span};
 
 /// Splits a file into tokens. `at` is the place in Rust code that names the file.
-pub(super) fn tokens(text: &str, file: &str, at: &Span, diagnostics: &mut Diagnostics) -> Vec<Token> {
+pub(super) fn tokens(text: &str, file: &str, at: &Span) -> Vec<Token> {
     let excerpt = Excerpt { text: text.into(), start: 0, end: 0, file: Some(file.into()) };
     let whole = Span { token: at.token, excerpt: Some(excerpt.clone()) };
-    let mut lexer =
-        Lexer { text: excerpt.text, whole: &whole, at: 0, tokens: Vec::new(), attribute: Attribute::No, diagnostics };
+    let mut lexer = Lexer { text: excerpt.text, whole: &whole, at: 0, tokens: Vec::new(), attribute: Attribute::No };
     while let Some(c) = lexer.peek() {
         lexer.token(c);
     }
@@ -32,7 +31,6 @@ struct Lexer<'a> {
     at: usize,
     tokens: Vec<Token>,
     attribute: Attribute,
-    diagnostics: &'a mut Diagnostics,
 }
 
 impl Lexer<'_> {
@@ -53,9 +51,11 @@ impl Lexer<'_> {
         self.tokens.push(Token { kind, span, notation: false, text });
     }
 
-    fn error(&mut self, start: usize, message: String, help: &str) {
-        let span = self.span(start);
-        self.diagnostics.push(Diagnostic::new(&span, message).help(help));
+    /// Adds a token that reports an error.
+    fn error(&mut self, start: usize, message: impl Into<String>, help: impl Into<String>) {
+        let error = Diagnostic::new(&self.span(start), message).help(help);
+        let text = self.text[start..self.at].to_owned();
+        self.push(error.into(), start, text);
     }
 
     /// Consumes characters while `part` holds, and returns them.
@@ -68,7 +68,8 @@ impl Lexer<'_> {
 
     fn token(&mut self, c: char) {
         let start = self.at;
-        if c.is_whitespace() {
+        // A byte order mark may begin a file.
+        if c.is_whitespace() || start == 0 && c == '\u{feff}' {
             self.at += c.len_utf8();
         } else if self.rest().starts_with("//") {
             self.comment();
@@ -76,8 +77,8 @@ impl Lexer<'_> {
             self.at += self.rest().find("*/").map_or(self.rest().len(), |end| end + 2);
         } else if c == '"' {
             self.string();
-        } else if c.is_alphabetic() || c == '_' {
-            let name = self.take_while(|c| c.is_alphabetic() || c.is_ascii_digit() || c == '_' || c == notation::HAT);
+        } else if is_letter(c) || c == '_' {
+            let name = self.take_while(|c| is_letter(c) || c.is_ascii_digit() || c == '_' || c == notation::HAT);
             self.push(Kind::Name(name.clone()), start, name);
         } else if c.is_ascii_digit() {
             self.number();
@@ -114,7 +115,7 @@ impl Lexer<'_> {
         let inside = (start + 1, self.at);
         if self.peek().is_none() {
             self.at = start + 1;
-            self.error(start, "this string has no end".into(), "close it with `\"`");
+            self.error(start, "this string has no end", "close it with `\"`");
             self.at = self.text.len();
             return;
         }
@@ -122,7 +123,7 @@ impl Lexer<'_> {
         let quoted = format!("{content:?}");
         let kind = match self.attribute {
             Attribute::Inside(_) => Kind::Text(content),
-            _ => Kind::Notation(notation::tokens_within(&self.text, inside, self.whole, self.diagnostics)),
+            _ => Kind::Notation(notation::tokens_within(&self.text, inside, self.whole)),
         };
         self.push(kind, start, quoted);
     }
@@ -145,7 +146,7 @@ impl Lexer<'_> {
         self.take_while(|c| c.is_alphanumeric() || c == '_');
         let text = self.text[start..self.at].to_owned();
         let span = self.span(start);
-        let kind = literal_kind(&text, &span, false, self.diagnostics);
+        let kind = literal_kind(&text, &span, false);
         self.push(kind, start, text);
     }
 
@@ -154,10 +155,16 @@ impl Lexer<'_> {
         let pair = OPERATORS.iter().find(|pair| self.rest().starts_with(**pair));
         let symbol = pair.map_or_else(|| c.to_string(), |pair| (*pair).to_owned());
         self.at += symbol.len();
+        if c == '#' && !self.rest().trim_start().starts_with('[') {
+            self.error(start, "`#` begins no comment", "comments begin with `//`");
+            self.take_while(|c| c != '\n');
+            return;
+        }
         if !"#[](){}<>=!&|+-*/^,;:.".contains(c) {
-            let help = super::habits::symbol(&symbol);
-            let help = help.unwrap_or("put mathematical notation in a string: \"‖p − q‖ − L\"");
-            self.error(start, format!("the character `{c}` has no meaning here"), help);
+            let (message, help) = characters::misplaced(c);
+            let help = help.or_else(|| super::habits::symbol(&symbol).map(str::to_owned));
+            let help = help.unwrap_or_else(|| "put mathematical notation in a string: \"‖p − q‖ − L\"".into());
+            self.error(start, message, help);
             return;
         }
         self.attribute = match (self.attribute, c) {
@@ -172,4 +179,9 @@ impl Lexer<'_> {
         };
         self.push(Kind::Symbol(symbol.clone()), start, symbol);
     }
+}
+
+/// Returns whether a character belongs to names.
+fn is_letter(c: char) -> bool {
+    c.is_alphabetic() && characters::halfwidth(c).is_none()
 }

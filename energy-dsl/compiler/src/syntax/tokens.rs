@@ -1,7 +1,7 @@
 use proc_macro2::{Delimiter, Spacing, TokenStream, TokenTree};
 
 use super::notation;
-use crate::diagnostic::{Diagnostic, Diagnostics, Span};
+use crate::diagnostic::{Diagnostic, Span};
 
 /// The kind of a token.
 #[derive(Clone, Debug, PartialEq)]
@@ -14,6 +14,26 @@ pub(super) enum Kind {
     Text(String),
     /// An operator, bracket or separator.
     Symbol(String),
+    /// Characters that are no token. The parser reports the error where it meets them, and nothing else of the same
+    /// declaration.
+    Broken(Fault),
+}
+
+/// Describes characters that are no token.
+#[derive(Clone, Debug)]
+pub(super) struct Fault(pub(super) Box<Diagnostic>);
+
+impl PartialEq for Fault {
+    /// Two faults are never the same token.
+    fn eq(&self, _: &Self) -> bool {
+        false
+    }
+}
+
+impl From<Diagnostic> for Kind {
+    fn from(error: Diagnostic) -> Self {
+        Self::Broken(Fault(Box::new(error)))
+    }
 }
 
 /// A token and its place.
@@ -75,21 +95,16 @@ impl PartialEq for Token {
 pub(super) const OPERATORS: &[&str] = &["==", "!=", "<=", ">=", "&&", "||", "->", ".."];
 
 /// Converts Rust tokens. Strings in attributes stay text; all others are notation.
-pub(super) fn from_rust(stream: TokenStream, diagnostics: &mut Diagnostics) -> Vec<Token> {
+pub(super) fn from_rust(stream: TokenStream) -> Vec<Token> {
     let mut tokens = Vec::new();
-    flatten(stream, &mut tokens, (false, 0), diagnostics);
+    flatten(stream, &mut tokens, (false, 0));
     tokens
 }
 
 /// Nested brackets are walked by recursion, so their depth is bounded. The parser refuses far shallower nesting.
 const DEEPEST: usize = 1000;
 
-fn flatten(
-    stream: TokenStream,
-    tokens: &mut Vec<Token>,
-    (attribute, depth): (bool, usize),
-    diagnostics: &mut Diagnostics,
-) {
+fn flatten(stream: TokenStream, tokens: &mut Vec<Token>, (attribute, depth): (bool, usize)) {
     let mut trees = stream.into_iter().peekable();
     let mut after_hash = false;
     while let Some(tree) = trees.next() {
@@ -99,7 +114,7 @@ fn flatten(
         match tree {
             TokenTree::Ident(name) => push(Kind::Name(name.to_string()), span, name.to_string()),
             TokenTree::Literal(literal) => {
-                let kind = literal_kind(&literal.to_string(), &span, attribute, diagnostics);
+                let kind = literal_kind(&literal.to_string(), &span, attribute);
                 push(kind, span, literal.to_string());
             }
             TokenTree::Punct(first) => {
@@ -124,7 +139,7 @@ fn flatten(
                     push(Kind::Symbol(open.into()), Span::of(group.span_open()), open.into());
                 }
                 if depth < DEEPEST {
-                    flatten(group.stream(), tokens, (attribute || after_hash, depth + 1), diagnostics);
+                    flatten(group.stream(), tokens, (attribute || after_hash, depth + 1));
                 }
                 if !close.is_empty() {
                     tokens.push(Token {
@@ -141,23 +156,37 @@ fn flatten(
 }
 
 /// Returns the token of a number, or of a string with notation.
-pub(super) fn literal_kind(text: &str, span: &Span, attribute: bool, diagnostics: &mut Diagnostics) -> Kind {
+pub(super) fn literal_kind(text: &str, span: &Span, attribute: bool) -> Kind {
     if let Ok(string) = syn::parse_str::<syn::LitStr>(text) {
         let content = string.value();
-        return if attribute {
-            Kind::Text(content)
-        } else {
-            Kind::Notation(notation::tokens(&content, span, diagnostics))
-        };
+        return if attribute { Kind::Text(content) } else { Kind::Notation(notation::tokens(&content, span)) };
+    }
+    if text.starts_with('"') {
+        // Only rustc passes on a string that is no token.
+        return Diagnostic::known_to_rustc(span).into();
     }
     let plain = text.replace('_', "");
     let plain = plain.trim_end_matches("f64").trim_end_matches("f32");
-    if let Ok(number) = plain.parse() {
-        return Kind::Number(number);
+    if plain.parse::<f64>().is_ok() {
+        return number(plain, span);
     }
-    diagnostics.push(
-        Diagnostic::new(span, format!("expected a number or a string with a formula, found the literal {text}"))
-            .help("write numbers as 2, 0.5 or 1e-3"),
-    );
-    Kind::Number(0.0)
+    let message = format!("expected a number or a string with a formula, found the literal {text}");
+    Diagnostic::new(span, message).help("write numbers as 2, 0.5 or 1e-3").into()
+}
+
+/// Returns the token of a number as written. Numbers that no double holds are refused.
+pub(super) fn number(text: &str, span: &Span) -> Kind {
+    let significand = text.split(['e', 'E']).next().unwrap_or_default();
+    match text.parse::<f64>() {
+        Err(_) => Diagnostic::new(span, format!("`{text}` is not a number")).into(),
+        Ok(value) if value.is_infinite() => {
+            let message = format!("the number {text} is too large: numbers end at {:e}", f64::MAX);
+            Diagnostic::new(span, message).help("write `infinity` for an infinite value").into()
+        }
+        Ok(0.0) if significand.contains(|c: char| ('1'..='9').contains(&c)) => {
+            let message = format!("the number {text} is too small: it would be rounded to 0");
+            Diagnostic::new(span, message).help("choose a unit in which it is larger, or write 0").into()
+        }
+        Ok(value) => Kind::Number(value),
+    }
 }

@@ -129,6 +129,12 @@ fn is_negative(x: Factor) -> bool {
 
 impl Series {
     fn constant(value: Factor) -> Self {
+        let plain = value.to_scalar();
+        if plain.is_infinite() && !value.is_finite() {
+            // The constant `infinity` of a formula.
+            let order = Order { power: -BEYOND, logs: 0.0 };
+            return Self::of(vec![Term::exact(order, factor(1.0_f64.copysign(plain)))], Order::NEVER);
+        }
         Self::of(vec![Term::exact(Order::ONE, value)], Order::NEVER)
     }
 

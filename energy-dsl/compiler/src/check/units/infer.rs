@@ -80,8 +80,8 @@ impl<'a> Inference<'a> {
 
     pub(super) fn expression(&mut self, typed: &Typed) -> Units {
         match &typed.kind {
-            // Zero has any unit.
-            TypedKind::Constant(0.0) => self.fresh(typed.shape),
+            // Zero and infinity have any unit.
+            TypedKind::Constant(value) if *value == 0.0 || value.is_infinite() => self.fresh(typed.shape),
             TypedKind::Constant(_) | TypedKind::Pi => Units::one(Dimension::default()),
             TypedKind::Input(source, first) => self.input(*source, *first, typed.shape),
             TypedKind::Binding(number) => self.binding(*number),
