@@ -120,8 +120,8 @@ impl Analysis {
     }
 
     fn of(&mut self, g: &Graph, node: NodeId) -> Degrees {
-        let d = |operand: NodeId| self.degrees.get(&g.resolve(operand)).copied().unwrap_or_default();
-        match g.op(node) {
+        let d = |operand: NodeId| self.degrees[&g.resolve(operand)];
+        match g.fused(node) {
             Op::Input(input) => {
                 self.unbounded_number(node, matches!(input, Input::Parameter(_) | Input::Precomputed(_)))
             }
