@@ -119,13 +119,13 @@ impl Whole {
         Self { name: self.name, reduced, groups, hazards: Hazards { flags, sound, ..Hazards::default() } }
     }
 
-    /// Returns the mask where all results are finite, if the guards hold. Adds a guard if that takes one.
+    /// Returns the mask where all results are finite, if the guards hold. Adds those that this takes.
     fn is_finite(&self, g: &mut Graph, guards: &mut Vec<NodeId>) -> NodeId {
         // Before results are expanded to points, they are fewer. The values come first.
         let values = if self.has_values() { self.groups[0].len().min(self.reduced.len()) } else { 0 };
         let (values, derivatives) = self.reduced.split_at(values);
         let tests = Tests::of(g, guards, derivatives);
-        guards.extend(tests.parameters(g));
+        guards.extend(tests.guards(g));
         let all = [values, &tests.results].concat();
         let (sum, infinity) = (g.pairwise_sum(&all), g.constant(f64::INFINITY));
         let size = g.abs(sum);

@@ -1,8 +1,9 @@
-//! Finds results that may overflow although the values of a routine do not: a final test covers them.
+//! Finds results that may overflow although the values of a routine do not.
 //!
-//! Guards bound lengths and their reciprocals, so that products of some of them are numbers. Other inputs are unbounded.
-//! A derivative with a product of two unbounded numbers, such as k² of the second derivative of tanh(k x), is tested. One
-//! with products of different parameters, such as k L, is a number if all of these are far from overflow.
+//! Guards bound some lengths and their reciprocals, so that products of a few are numbers. All other inputs are unbounded.
+//! A derivative with the square of an unbounded parameter, such as k² of the second derivative of tanh(k x), is tested
+//! when it is known. Products of different parameters, such as k L, and of lengths are numbers if these are far from
+//! overflow: that takes one more guard.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -10,52 +11,71 @@ use crate::graph::{Graph, Input, NodeId, Op, reachable};
 
 /// Parameters whose products with each other and with bounded numbers are numbers: in double and in single precision.
 const LARGEST_PARAMETER: (f64, f64) = (1e120, 1e15);
+/// Lengths on the ordinary path: 2⁸⁰ and 2¹².
+const LARGEST_LENGTH: (f64, f64) = ((1_u128 << 80) as f64, 4096.0);
 /// A larger constant counts as unbounded.
 const LARGEST_CONSTANT: f64 = 1e15;
 
-/// What must be tested after a routine has run.
+/// Tests of the ordinary path of a routine.
+#[derive(Default)]
 pub(super) struct Tests {
     /// Results that must be finite.
     pub(super) results: Vec<NodeId>,
     /// Parameters that must be far from overflow.
     parameters: BTreeSet<NodeId>,
+    /// Lengths that must be far from overflow.
+    lengths: BTreeSet<NodeId>,
 }
 
 impl Tests {
     /// Looks at derivatives on the ordinary path, whose guards hold. Without guards there is no other path for large
-    /// parameters, so that results are tested instead.
+    /// inputs, so that results are tested instead. So they are if they are fewer than the lengths.
     pub(super) fn of(g: &Graph, guards: &[NodeId], derivatives: &[NodeId]) -> Self {
         let analysis = Analysis::new(g, guards, derivatives);
-        let mut tests = Self { results: Vec::new(), parameters: BTreeSet::new() };
+        let (mut tests, mut others) = (Self::default(), Vec::new());
         for &derivative in derivatives {
             match analysis.products(g.resolve(derivative)) {
                 Products::Bounded => {}
-                Products::OfParameters(parameters) if !guards.is_empty() => tests.parameters.extend(parameters),
+                Products::Of { parameters, lengths } if !guards.is_empty() => {
+                    tests.parameters.extend(parameters);
+                    if !lengths.is_empty() {
+                        tests.lengths.extend(lengths);
+                        others.push(derivative);
+                    }
+                }
                 _ => tests.results.push(derivative),
             }
+        }
+        if others.len() < tests.lengths.len() {
+            tests.lengths.clear();
+            tests.results.extend(others);
         }
         tests
     }
 
-    /// Creates the mask where all parameters are far from overflow; `None` if none needs to be.
-    pub(super) fn parameters(&self, g: &mut Graph) -> Option<NodeId> {
-        let parameters: Vec<NodeId> = self.parameters.iter().copied().collect();
-        if parameters.is_empty() {
-            return None;
+    /// Creates the masks where inputs are far from overflow.
+    pub(super) fn guards(&self, g: &mut Graph) -> Vec<NodeId> {
+        let mut guards = Vec::new();
+        for (inputs, (double, single)) in [(&self.parameters, LARGEST_PARAMETER), (&self.lengths, LARGEST_LENGTH)] {
+            if !inputs.is_empty() {
+                let square = g.sum_of_squares(&inputs.iter().copied().collect::<Vec<_>>());
+                let largest = g.by_precision(double * double, single * single);
+                guards.push(g.less(square, largest));
+            }
         }
-        let square = g.sum_of_squares(&parameters);
-        let [double, single] = [LARGEST_PARAMETER.0, LARGEST_PARAMETER.1].map(|largest| largest * largest);
-        let largest = g.by_precision(double, single);
-        Some(g.less(square, largest))
+        guards
     }
 }
 
 /// The products of unbounded numbers in a result.
 enum Products {
     Bounded,
-    OfParameters(Vec<NodeId>),
+    Of { parameters: Vec<NodeId>, lengths: Vec<NodeId> },
     Unbounded,
 }
+
+/// The bit of numbers that have no bit of their own.
+const TOO_MANY: u128 = 1 << 127;
 
 /// Sets of unbounded numbers, as bits.
 #[derive(Clone, Copy, Default)]
@@ -88,18 +108,20 @@ impl Degrees {
 }
 
 /// The degrees of all operations of a routine.
+#[derive(Default)]
 struct Analysis {
     /// The unbounded numbers, in the order of their bits.
     unbounded: Vec<NodeId>,
-    /// Those that are parameters.
+    /// Those that are parameters, and lengths.
     parameters: u128,
+    lengths: u128,
     degrees: BTreeMap<NodeId, Degrees>,
 }
 
 impl Analysis {
     fn new(g: &Graph, guards: &[NodeId], results: &[NodeId]) -> Self {
         let bounded = bounded(g, guards);
-        let mut analysis = Self { unbounded: Vec::new(), parameters: 0, degrees: BTreeMap::new() };
+        let mut analysis = Self::default();
         for node in reachable(g, results) {
             let degrees = if bounded.contains(&node) { Degrees::default() } else { analysis.of(g, node) };
             analysis.degrees.insert(node, degrees);
@@ -109,58 +131,71 @@ impl Analysis {
 
     fn products(&self, result: NodeId) -> Products {
         let Some(&Degrees { squared, mixed, .. }) = self.degrees.get(&result) else { return Products::Unbounded };
-        match mixed {
-            _ if squared != 0 || mixed & !self.parameters != 0 => Products::Unbounded,
-            0 => Products::Bounded,
-            _ => {
-                let is_mixed = |(bit, _): &(usize, &NodeId)| mixed >> bit & 1 == 1;
-                Products::OfParameters(self.unbounded.iter().enumerate().filter(is_mixed).map(|(_, &n)| n).collect())
-            }
+        let products = squared | mixed;
+        if squared & !self.lengths != 0 || products & !(self.lengths | self.parameters) != 0 {
+            return Products::Unbounded;
         }
+        if products == 0 {
+            return Products::Bounded;
+        }
+        let among = |set: u128| {
+            let numbers = self.unbounded.iter().enumerate();
+            numbers.filter(|(bit, _)| (products & set) >> bit & 1 == 1).map(|(_, &number)| number).collect()
+        };
+        Products::Of { parameters: among(self.parameters), lengths: among(self.lengths) }
     }
 
     fn of(&mut self, g: &Graph, node: NodeId) -> Degrees {
         let d = |operand: NodeId| self.degrees[&g.resolve(operand)];
         match g.fused(node) {
-            Op::Input(input) => {
-                self.unbounded_number(node, matches!(input, Input::Parameter(_) | Input::Precomputed(_)))
+            Op::Input(Input::Position(_) | Input::Velocity(_)) => self.length(node),
+            Op::Sub(a, b) if is_moving_input(g, a) && is_moving_input(g, b) => self.length(node),
+            Op::Input(_) => self.parameter(node),
+            Op::Constant(bits) if !f64::from_bits(bits).is_finite() => {
+                Degrees { squared: TOO_MANY, ..Degrees::default() }
             }
-            Op::Constant(bits) if !f64::from_bits(bits).is_finite() => Degrees { squared: 1, ..Degrees::default() },
-            Op::Constant(bits) if f64::from_bits(bits).abs() > LARGEST_CONSTANT => self.unbounded_number(node, false),
+            Op::Constant(bits) if f64::from_bits(bits).abs() > LARGEST_CONSTANT => self.unbounded_number(node),
             Op::Neg(a) | Op::Abs(a) | Op::Sqrt(a) => d(a),
-            Op::Add(a, b)
-            | Op::Sub(a, b)
-            | Op::Min(a, b)
-            | Op::Max(a, b)
-            | Op::SumError(a, b)
-            | Op::DifferenceError(a, b)
-            | Op::Select(_, a, b) => d(a).plus(d(b)),
-            Op::Mul(a, b) | Op::ProductError(a, b) => d(a).times(d(b)),
+            Op::Add(a, b) | Op::Sub(a, b) | Op::Min(a, b) | Op::Max(a, b) | Op::Select(_, a, b) => d(a).plus(d(b)),
+            Op::Mul(a, b) => d(a).times(d(b)),
             Op::FusedMulSub(a, b, c)
             | Op::MulAdd(a, b, c)
             | Op::MulSub(a, b, c)
             | Op::NegMulAdd(a, b, c)
             | Op::NegMulSub(a, b, c) => d(a).times(d(b)).plus(d(c)),
-            Op::RootError(a, _) => d(a),
             // Guards bound the reciprocals of divisors.
             Op::Div(a, _) => d(a),
-            // Sines and angles are bounded; guards bound exponentials, logarithms and powers.
+            // Rounding errors are smaller than the results that they belong to. Sines and angles are bounded; guards bound
+            // exponentials, logarithms and powers.
             _ => Degrees::default(),
         }
     }
 
+    fn length(&mut self, node: NodeId) -> Degrees {
+        let degrees = self.unbounded_number(node);
+        self.lengths |= degrees.linear;
+        degrees
+    }
+
+    fn parameter(&mut self, node: NodeId) -> Degrees {
+        let degrees = self.unbounded_number(node);
+        self.parameters |= degrees.linear;
+        degrees
+    }
+
     /// Returns the degrees of one more unbounded number. If there are too many, it counts as a square.
-    fn unbounded_number(&mut self, node: NodeId, is_parameter: bool) -> Degrees {
+    fn unbounded_number(&mut self, node: NodeId) -> Degrees {
         let bit = self.unbounded.len();
-        if bit >= 128 {
-            return Degrees { linear: 0, squared: 1, mixed: 0 };
+        if bit >= 127 {
+            return Degrees { squared: TOO_MANY, ..Degrees::default() };
         }
         self.unbounded.push(node);
-        if is_parameter {
-            self.parameters |= 1 << bit;
-        }
-        Degrees { linear: 1 << bit, squared: 0, mixed: 0 }
+        Degrees { linear: 1 << bit, ..Degrees::default() }
     }
+}
+
+fn is_moving_input(g: &Graph, node: NodeId) -> bool {
+    matches!(g.op(g.resolve(node)), Op::Input(Input::Position(_) | Input::Velocity(_)))
 }
 
 /// Returns the numbers that guards bound: moderate ones, and the components of vectors whose squares are.
