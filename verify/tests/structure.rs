@@ -221,8 +221,8 @@ fn crates_do_not_depend_on_each_other_in_a_cycle() {
     assert_eq!(cycle(&graph), None, "dependencies, development dependencies included, form a cycle");
 }
 
-/// Returns all crates that a crate of the workspace builds, as far as manifests of the workspace name them. Dependencies
-/// of tests do not count.
+/// Returns all crates that a crate of the workspace builds, as far as manifests of the workspace name them.
+/// Dependencies of tests do not count.
 fn named_dependencies(of: &str) -> BTreeSet<String> {
     let crates: BTreeMap<String, PathBuf> = crates().into_iter().collect();
     let (mut found, mut open) = (BTreeSet::new(), vec![of.to_owned()]);

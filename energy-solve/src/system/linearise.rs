@@ -44,7 +44,8 @@ impl System {
     /// The system keeps the constant part of each matrix, so pass the same matrix to every step.
     ///
     /// # Errors
-    /// If the state is incomplete or not finite, a force is not finite, or an element is outside of its formula's domain.
+    /// If the state is incomplete or not finite, a force is not finite, or an element is outside of its formula's
+    /// domain.
     ///
     /// # Panics
     /// If the matrix was not created by this system.
@@ -61,7 +62,8 @@ impl System {
     /// [`System::linearise`]. Masses belong to the constant part of the matrix.
     ///
     /// # Errors
-    /// If the state is incomplete or not finite, a force is not finite, or an element is outside of its formula's domain.
+    /// If the state is incomplete or not finite, a force is not finite, or an element is outside of its formula's
+    /// domain.
     ///
     /// # Panics
     /// If the matrix was not created by this system, or the number of masses is neither zero nor that of the vertices.

@@ -2,8 +2,8 @@
 
 use verify_command::bench::{bench, markdown, plots};
 
-/// With the step at which their errors are least, differences of a hinge have all the digits that they can have: a fixed
-/// step left 1.1e-9 to central ones.
+/// With the step at which their errors are least, differences of a hinge have all the digits that they can have: a
+/// fixed step left 1.1e-9 to central ones.
 #[test]
 fn differences_take_their_best_step_and_dual_numbers_one_evaluation() {
     let list = bench(&["HingeAngle".into()]).unwrap();

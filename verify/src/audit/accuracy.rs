@@ -106,8 +106,8 @@ fn offset(declaration: &Declaration, sample: &Sample, (what, size): (Perturbed, 
     Sample { parameters, rest, positions, velocities }
 }
 
-/// Returns κ of all blocks in multi-precision, in the order of the blocks, and the bits spent. Inputs are perturbed by a
-/// roundoff: near a singularity, larger perturbations would leave its neighbourhood.
+/// Returns κ of all blocks in multi-precision, in the order of the blocks, and the bits spent. Inputs are perturbed by
+/// a roundoff: near a singularity, larger perturbations would leave its neighbourhood.
 pub(super) fn true_amplifications(subject: &Subject, sample: &Sample, here: &[TrueBlock]) -> (Vec<f64>, usize) {
     let mut random = Rng::with_seed(1);
     let parameters = enters_as_edges(subject.declaration) && !sample.parameters.is_empty();

@@ -45,7 +45,8 @@ pub(super) fn culprit(subject: &Subject, sample: &Sample, block_order: usize, er
     Culprit { subexpression: Some(part.text.clone()), proposal: proposal(part).into() }
 }
 
-/// Returns the input, and others of slightly different parameters: at a single one, rounding errors may happen to cancel.
+/// Returns the input, and others of slightly different parameters: at a single one, rounding errors may happen to
+/// cancel.
 fn variations(sample: &Sample) -> Vec<Sample> {
     let mut random = Rng::with_seed(1);
     let varied = |number: usize| {

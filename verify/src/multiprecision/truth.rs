@@ -44,8 +44,8 @@ impl TrueBlock {
         }
     }
 
-    /// Returns the largest difference from another block in multi-precision, relative to the largest number; 0 for equal
-    /// blocks.
+    /// Returns the largest difference from another block in multi-precision, relative to the largest number; 0 for
+    /// equal blocks.
     #[must_use]
     pub fn relative_difference(&self, other: &Self) -> f64 {
         let pairs = self.block.numbers.iter().zip(&other.block.numbers);

@@ -13,7 +13,8 @@ pub(super) const FUNCTIONS: &[Function] = &[
         docs: "Rotation R of the polar decomposition F = R S, S symmetric. For a square matrix (2×2 or 3×3), det R = \
              1, and the singular values have the sign of det F on the smallest. Where two of them sum to 0, the result \
              is taken as 0 and flagged; for a 3×3 matrix also where the sum is below 400 roundoffs of the largest. \
-             Elsewhere, errors are below 50 u κ with κ = σ₁/(σ₂ + σ₃). For a 3×2 matrix, R has orthonormal columns and S ≥ 0; the result is flagged where the columns are parallel.",
+             Elsewhere, errors are below 50 u κ with κ = σ₁/(σ₂ + σ₃). For a 3×2 matrix, R has orthonormal columns and \
+             S ≥ 0; the result is flagged where the columns are parallel.",
         shape: |shapes| deformation(shapes).map(|_| shapes[0]),
         lower: |g, a| rotation(g, &a[0]),
         accuracy: "",

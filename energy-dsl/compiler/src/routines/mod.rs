@@ -56,7 +56,7 @@ impl Routine {
     /// Returns whether the first group is of values, not of derivatives.
     #[must_use]
     pub fn has_values(&self) -> bool {
-        self.name != "hessian_vector"
+        has_values(self.name)
     }
 
     /// Returns whether the first result is an energy, which is infinite outside of its domain.
@@ -78,6 +78,11 @@ impl Routine {
         let guard = self.general.as_ref().map(|general| general.ordinary);
         self.reduced.iter().copied().chain(self.flags.into_iter().flatten()).chain(guard).collect()
     }
+}
+
+/// Returns whether the first group of a routine is of values, not of derivatives.
+fn has_values(routine: &str) -> bool {
+    routine != "hessian_vector"
 }
 
 /// A routine before it is split into its ordinary and its general path.
@@ -122,7 +127,7 @@ impl Whole {
     /// Returns the mask where all results are finite, if the guards hold. Adds those that this takes.
     fn is_finite(&self, g: &mut Graph, guards: &mut Vec<NodeId>) -> NodeId {
         // Before results are expanded to points, they are fewer. The values come first.
-        let values = if self.has_values() { self.groups[0].len().min(self.reduced.len()) } else { 0 };
+        let values = if has_values(self.name) { self.groups[0].len().min(self.reduced.len()) } else { 0 };
         let (values, derivatives) = self.reduced.split_at(values);
         let tests = Tests::of(g, guards, derivatives);
         guards.extend(tests.guards(g));
@@ -130,11 +135,6 @@ impl Whole {
         let (sum, infinity) = (g.pairwise_sum(&all), g.constant(f64::INFINITY));
         let size = g.abs(sum);
         g.less(size, infinity)
-    }
-
-    /// Returns whether the first group is of values, not of derivatives.
-    fn has_values(&self) -> bool {
-        self.name != "hessian_vector"
     }
 
     fn split(self, g: &mut Graph) -> Routine {

@@ -1,9 +1,9 @@
 //! Finds results that may overflow although the values of a routine do not.
 //!
-//! Guards bound some lengths and their reciprocals, so that products of a few are numbers. All other inputs are unbounded.
-//! A derivative with the square of an unbounded parameter, such as k² of the second derivative of tanh(k x), is tested
-//! when it is known. Products of different parameters, such as k L, and of lengths are numbers if these are far from
-//! overflow: that takes one more guard.
+//! Guards bound some lengths and their reciprocals, so that products of a few are numbers. All other inputs are
+//! unbounded. A derivative with the square of an unbounded parameter, such as k² of the second derivative of tanh(k x),
+//! is tested when it is known. Products of different parameters, such as k L, and of lengths are numbers if these are
+//! far from overflow: that takes one more guard.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -165,8 +165,8 @@ impl Analysis {
             | Op::NegMulSub(a, b, c) => d(a).times(d(b)).plus(d(c)),
             // Guards bound the reciprocals of divisors.
             Op::Div(a, _) => d(a),
-            // Rounding errors are smaller than the results that they belong to. Sines and angles are bounded; guards bound
-            // exponentials, logarithms and powers.
+            // Rounding errors are smaller than the results that they belong to. Sines and angles are bounded; guards
+            // bound exponentials, logarithms and powers.
             _ => Degrees::default(),
         }
     }

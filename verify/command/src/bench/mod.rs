@@ -120,7 +120,8 @@ pub fn plots(list: &[Measured]) -> Vec<(String, String)> {
         .filter_map(|(name, list)| {
             let mut curves: Vec<Curve> = Vec::new();
             for m in &list {
-                // A logarithmic axis has no 0: exact results have a legend of their own, which says where they are drawn.
+                // A logarithmic axis has no 0: exact results have a legend of their own, which says where they are
+                // drawn.
                 let (name, error) = match m.error {
                     0.0 => (format!("{}: exact, drawn at 1e-18", m.method), 1e-18),
                     error => (m.method.to_owned(), error),

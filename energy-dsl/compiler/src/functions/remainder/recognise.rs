@@ -155,8 +155,8 @@ fn own_term(g: &Graph, sum: &[(NodeId, f64)], function: NodeId) -> Option<(NodeI
     Some(own)
 }
 
-/// Removes the head of the series from xᵏ Φₖ. Returns the order k′ and the sign of the remainder; `None` if terms of the
-/// head are missing, or others are left.
+/// Removes the head of the series from xᵏ Φₖ. Returns the order k′ and the sign of the remainder; `None` if terms of
+/// the head are missing, or others are left.
 fn after_head(function: Function, mut head: Vec<(u32, f64)>) -> Option<(u32, f64)> {
     let (mut k, mut sign) = (function.k, 1.0);
     while !head.is_empty() {

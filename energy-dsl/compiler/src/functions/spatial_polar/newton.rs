@@ -44,9 +44,9 @@ pub(super) fn compliance(g: &mut Graph, stretch: &Matrix) -> Inverse {
     inverted(g, &stiffness)
 }
 
-/// Returns R after a step of Newton's method, whose errors are nearly those of rounding R. `turn` returns K⁻¹ a. With the
-/// error H = (RᵀR − I)/2 of orthogonality, the step is R (I − H + [K⁻¹ a]ₓ) with \[a\]ₓ = M − Mᵀ − (H M − M H) and M = RᵀF.
-/// H and M − Mᵀ, which cancel, are computed with twice the digits.
+/// Returns R after a step of Newton's method, whose errors are nearly those of rounding R. `turn` returns K⁻¹ a. With
+/// the error H = (RᵀR − I)/2 of orthogonality, the step is R (I − H + [K⁻¹ a]ₓ) with \[a\]ₓ = M − Mᵀ − (H M − M H) and
+/// M = RᵀF. H and M − Mᵀ, which cancel, are computed with twice the digits.
 pub(super) fn refined(
     g: &mut Graph,
     r: &Matrix,

@@ -16,8 +16,8 @@ use crate::graph::{Form, Graph, NodeId};
 
 /// Laguerre's steps of the textbook form. It starts at √(3i) ≥ T and converges from above, because all roots are real.
 const TEXTBOOK_STEPS: usize = 10;
-/// The largest condition numbers for which two steps of Newton's method correct the errors of R: in double precision and
-/// in single precision.
+/// The largest condition numbers for which two steps of Newton's method correct the errors of R: in double precision
+/// and in single precision.
 const LARGEST_CONDITION: (f64, f64) = (500.0, 32.0);
 /// The largest ratio (σ₂ − σ₃)/(σ₂ + σ₃). It amplifies the errors of R in S.
 const LARGEST_REFLECTION: f64 = 16.0;

@@ -1,7 +1,7 @@
 //! R from the singular value decomposition F = U Σ Vᵀ, as U Vᵀ, for matrices of any condition.
 //!
-//! Rotations of Jacobi's method leave the errors of a matrix close to F, which the condition number κ amplifies: those of
-//! R are about u κ. Near mirror images they would spoil S, too. So R is refined.
+//! Rotations of Jacobi's method leave the errors of a matrix close to F, which the condition number κ amplifies: those
+//! of R are about u κ. Near mirror images they would spoil S, too. So R is refined.
 
 use super::matrix::{Matrix, Vector, transposed};
 use super::newton::refined;
@@ -64,8 +64,8 @@ pub(super) fn factors(g: &mut Graph, arguments: &[NodeId], f: &Matrix) -> (Facto
     (Factors { rotation, stretch, inverse, trace }, singular)
 }
 
-/// Returns the limit of the sum of all further turns. They form a geometric series, whose ratio is the relative error of
-/// σ₂ + σ₃ (Aitken's extrapolation).
+/// Returns the limit of the sum of all further turns. They form a geometric series, whose ratio is the relative error
+/// of σ₂ + σ₃ (Aitken's extrapolation).
 fn extrapolated(g: &mut Graph, before: &Vector, turn: &Vector) -> Vector {
     let [zero, one, largest] = [0.0, 1.0, LARGEST_RATIO].map(|number| g.constant(number));
     let (along, square) = (g.dot(turn, before), g.dot(before, before));
