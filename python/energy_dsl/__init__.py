@@ -108,6 +108,9 @@ class System(_System):
         Elements whose vertices are all pinned are left out: they are constant.
         With `curvature` "clamped" or "absolute", element Hessians are made positive semi-definite first. The pattern
         of the matrix stays the same from call to call.
+
+        Raises RuntimeError, which names the element, if one is outside of its formula's domain, such as an inverted
+        triangle with a logarithm of its area. `energy` returns infinity there, so that a line search steps back.
         """
         from scipy.sparse import bsr_array
 

@@ -76,6 +76,49 @@ def test_newton_finds_the_shape_of_a_hanging_chain():
     np.testing.assert_allclose(x[:, 2], x[::-1, 2], atol=1e-9)
 
 
+def test_elements_outside_of_their_domain_are_infinite():
+    text = """energy NeoHooke(x0, x1, x2: Point; mu: Scalar) {
+        let a = x1 - x0;
+        let b = x2 - x0;
+        let J = a.x * b.y - a.y * b.x;
+        mu / 2 * (norm_squared(a) + norm_squared(b) - 2 - 2 * log(J))
+    }"""
+    element = ed.energy(text)
+    system = ed.System(4)
+    system.add(element, [[0, 1, 2], [1, 3, 2]], mu=2.0)
+    x = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [1.2, 0.9, 0]])
+    assert np.isfinite(system.energy(x))
+    x[3, :2] = 0.2
+    assert system.energy(x) == np.inf
+    with pytest.raises(RuntimeError, match="NeoHooke 1: element 1"):
+        system.linearise(x)
+    U, marks = element.value(x[[1, 3, 2]][None], mu=2.0, flags=True)
+    assert U[0] == np.inf and marks[0] == 1
+
+
+def test_newton_never_inverts_a_triangle():
+    text = """energy NeoHooke(x0, x1, x2: Point; mu: Scalar) {
+        let a = x1 - x0;
+        let b = x2 - x0;
+        let J = a.x * b.y - a.y * b.x;
+        mu / 2 * (norm_squared(a) + norm_squared(b) - 2 - 2 * log(J)) + 2 * (J - 1)^2
+    }"""
+    system = ed.System(3, pinned=[0, 1])
+    system.add(ed.energy(text), [[0, 1, 2]], mu=1.0)
+    x = np.array([[0.0, 0, 0], [1, 0, 0], [0.3, 8.0, 0]])
+    from scipy.sparse.linalg import spsolve
+
+    for _ in range(60):
+        U, g, H = system.linearise(x, curvature="clamped")
+        step, length = np.zeros((3, 3)), 1.0
+        step[2] = -spsolve((H + 1e-9 * sparse.eye_array(3)).tocsc(), g[2])
+        while system.energy(x + length * step) > U and length > 1e-9:
+            length /= 2
+        x = x + length * step
+        assert x[2, 1] > 0
+    np.testing.assert_allclose(x[2], [0, 1, 0], atol=1e-6)
+
+
 def test_messages_say_what_was_expected():
     system, x = chain(4)
     spring = ed.energy(SPRING)
