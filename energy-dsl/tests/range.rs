@@ -1,6 +1,6 @@
 //! Every result is finite or flagged, also where intermediate results or derivatives overflow.
 
-use energy_dsl::{Hessian, Potential, Real, energy};
+use energy_dsl::{Block, Hessian, Potential, Real, energy};
 
 energy! {
     energy Tanh(p: Point; k: Scalar) { tanh(k * p.x) }
@@ -12,9 +12,12 @@ energy! {
     energy Law(p, q: Point; K: Scalar) { K * norm(p - q)^3 }
 }
 
-fn is_sound<T: Real<Mask = bool>>(at: &Hessian<T, [[T; 3]; 1], [[[T; 3]; 3]; 1]>) -> bool {
+type OfPoint<T> = Hessian<T, [[T; 3]; 1], [Block<T>; 1]>;
+
+/// Returns whether all results are finite or flagged.
+fn is_sound<T: Real<Mask = bool>>(at: &OfPoint<T>) -> bool {
     let numbers = std::iter::once(&at.value).chain(&at.gradient[0]).chain(at.hessian[0].as_flattened());
-    at.flags.any() || numbers.into_iter().all(|x| (*x - *x).equal(T::from_f64(0.0)))
+    at.flags.any() || numbers.into_iter().all(|x| x.abs().less(T::from_f64(f64::INFINITY)))
 }
 
 #[test]
