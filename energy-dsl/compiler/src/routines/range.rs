@@ -29,7 +29,7 @@ pub(super) struct Tests {
 
 impl Tests {
     /// Looks at derivatives on the ordinary path, whose guards hold. Without guards there is no other path for large
-    /// inputs, so that results are tested instead. So they are if they are fewer than the lengths.
+    /// inputs, so that results are tested instead. So they are if that takes fewer operations.
     pub(super) fn of(g: &Graph, guards: &[NodeId], derivatives: &[NodeId]) -> Self {
         let analysis = Analysis::new(g, guards, derivatives);
         let (mut tests, mut others) = (Self::default(), Vec::new());
@@ -46,7 +46,8 @@ impl Tests {
                 _ => tests.results.push(derivative),
             }
         }
-        if others.len() < tests.lengths.len() {
+        // A square and its sum are two operations.
+        if others.len() < 2 * tests.lengths.len() {
             tests.lengths.clear();
             tests.results.extend(others);
         }
