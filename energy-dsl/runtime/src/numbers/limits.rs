@@ -97,6 +97,7 @@ fn keep_conventions<T: Number>(roles: Roles<'_>, results: &mut [T]) {
     }
 }
 
+/// Evaluates the results along rays if one of them is not finite or may be a convention.
 fn look_around<T: Number>(inputs: &[T], roles: Roles<'_>, results: &mut [T], flags: &mut Flags<T>, along: Along<'_>) {
     let is_finite = |x: &T| (x.clone() - x.clone()).equal(T::from_f64(0.0)).all();
     if (flags.degenerate | flags.kink).any() || !results.iter().all(is_finite) {
