@@ -33,6 +33,14 @@ fn message<E: Element>() -> String {
     panic.downcast_ref::<String>().cloned().unwrap_or_default()
 }
 
+/// Asserts that the audit of a broken element fails with a message of these parts.
+fn assert_message_has<E: Element>(parts: &[&str]) {
+    let message = message::<E>();
+    for part in parts {
+        assert!(message.contains(part), "no {part} in\n{message}");
+    }
+}
+
 broken!(GradientSign, HairBend<f64>, "grad", |g| g[4] = -g[4]);
 broken!(HessianSign, QuadraticHinge<f64>, "hess", |h| {
     h[3 * 12 + 10] = -h[3 * 12 + 10];
@@ -91,19 +99,13 @@ impl Element for NaNNearby {
 
 #[test]
 fn a_value_without_a_flag_outside_of_the_domain_is_found() {
-    let message = message::<Unflagged>();
-    for part in ["flagged outside", "no value"] {
-        assert!(message.contains(part), "no {part} in\n{message}");
-    }
+    assert_message_has::<Unflagged>(&["flagged outside", "no value"]);
     assert_derivatives::<LogDifference<f64>>(20);
 }
 
 #[test]
 fn a_nan_near_a_singularity_is_found() {
-    let message = message::<NaNNearby>();
-    for part in ["`grad`", "nearly coincident", "NaN without a flag"] {
-        assert!(message.contains(part), "no {part} in\n{message}");
-    }
+    assert_message_has::<NaNNearby>(&["`grad`", "nearly coincident", "NaN without a flag"]);
 }
 
 #[test]

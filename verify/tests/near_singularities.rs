@@ -70,7 +70,7 @@ fn a_rest_length_is_found_among_the_parameters() {
     assert!(near.iter().any(|warning| warning.place.contains("`L`")), "{:?}", report.warnings().collect::<Vec<_>>());
 }
 
-/// As in κb = 2 a × b/(‖a‖‖b‖ + a·b), the curvature of discrete rods.
+/// The quotient is that of κb = 2 a × b/(‖a‖‖b‖ + a·b), the curvature of discrete rods.
 #[test]
 fn a_denominator_that_cancels_at_a_fold_is_named() {
     let report = report(

@@ -162,7 +162,7 @@ impl Subjects {
     }
 }
 
-/// The largest errors, as multiples of what is allowed, with their matrices.
+/// The largest errors, as multiples of their bounds, with their matrices.
 #[derive(Default)]
 struct Worst(Vec<(&'static str, f64, String)>);
 

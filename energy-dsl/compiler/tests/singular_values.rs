@@ -102,7 +102,7 @@ fn conditions_may_depend_on_one_singular_value() {
     ] {
         agree(&formula, "det(transpose(F) * F) + ddot(F, F)", &matrices);
     }
-    // Where one direction is slack, the energy is that of the other one.
+    // If one direction is slack, only the other one has energy.
     let slack = turned([1.5, 0.5, 0.0])[..2].to_vec();
     agree("(if s[1] <= 1 { s[0]^4 + 0 * s[1] } else { 0 })", "s[0]^4", &[slack]);
 }

@@ -57,7 +57,7 @@ impl Meter {
         self.charge(8 * self.value * self.derivatives);
     }
 
-    /// All blocks by multi-precision jets, of so many bits together.
+    /// All blocks by multi-precision jets, of this number of bits together.
     pub(super) fn truth(&self, bits: usize) {
         self.charge(self.value * self.derivatives * bits as u64 / 4);
     }

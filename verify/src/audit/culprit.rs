@@ -13,7 +13,7 @@ use crate::sample::Sample;
 /// Bits of the true numbers.
 const BITS: usize = 700;
 
-/// Where digits are lost, and a remedy.
+/// The subexpression that loses digits, and a remedy.
 pub(super) struct Culprit {
     /// The text of the subexpression; `None` if the formula as written loses none.
     pub(super) subexpression: Option<String>,
@@ -73,7 +73,7 @@ fn relative_error(exact: &[Jet<Big>], found: &[Jet<f64>], order: usize) -> f64 {
     let exact: Vec<Big> = exact.iter().flat_map(|jet| derivatives(jet, order)).collect();
     let found: Vec<f64> = found.iter().flat_map(|jet| derivatives(jet, order)).collect();
     let largest = exact.iter().map(|x| x.to_f64().abs()).fold(0.0, worse);
-    // Without a true value, or out of the range of doubles, there is no error.
+    // The error is unknown if the true value is, or is out of the range of doubles.
     if !largest.is_finite() || largest < f64::MIN_POSITIVE {
         return 0.0;
     }
@@ -95,7 +95,7 @@ fn derivatives<T: Number>(jet: &Jet<T>, order: usize) -> Vec<T> {
     }
 }
 
-/// Returns a spelling that keeps the digits, by what a subexpression contains.
+/// Returns a spelling that keeps the digits, chosen by the functions of a subexpression.
 fn proposal(part: &Part) -> &'static str {
     let has = |text: &str| part.text.contains(text);
     match part.function {

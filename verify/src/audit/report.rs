@@ -297,7 +297,7 @@ pub struct Section {
     pub warnings: Vec<Warning>,
     /// Number of random inputs that were replaced, because the formula has no value there.
     pub outside: usize,
-    /// What the budget of the element left out; empty if nothing.
+    /// Checks that the budget of the element left out; empty if all were made.
     pub left_out: Vec<String>,
     /// Planted faults; `None` if the source of the element is not available.
     pub mutations: Option<MutationScore>,

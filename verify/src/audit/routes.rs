@@ -77,7 +77,7 @@ impl Auditor<'_> {
             routes.push(Route { name: "multi-precision".into(), numbers: digits, uncertainty: 0.0, check: None });
         }
         let dual = self.subject.tolerance(Check::DualNumbers);
-        // Where the formula as written is 0/0, dual numbers have no value to compare a limit with.
+        // If the formula as written is 0/0, dual numbers have no value to compare a limit with.
         let numbers = &case.dual(block.name).numbers;
         if !numbers.iter().any(|number| number.is_nan()) {
             routes.push(Route {

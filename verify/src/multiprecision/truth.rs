@@ -103,7 +103,7 @@ pub(crate) fn truth_of_ordinary(
     at_rising_precision(digits, Zeros::Believed, HIGHEST, || blocks_over(declaration, formula, sample))
 }
 
-/// True blocks, and what they cost.
+/// True blocks, and their cost.
 #[derive(Clone, Debug)]
 pub(crate) struct Truth {
     pub(crate) blocks: Vec<TrueBlock>,

@@ -3,7 +3,7 @@
 use std::f64::consts::FRAC_2_SQRT_PI;
 
 use super::elementary::one_scalar;
-use super::sinc::{economised, polynomial};
+use super::power_series::{Interval, economised, polynomial};
 use super::{Function, Lowered};
 use crate::graph::{Form, Graph, NodeId, Primitive, Rule};
 
@@ -48,11 +48,11 @@ fn erf(g: &mut Graph, x: NodeId) -> NodeId {
 
     let square = g.mul(size, size);
     // (−1)ᵏ/(k! (2k + 1))
-    let coefficient = |k: i32| {
+    let coefficient = |k: u32| {
         let factorial: f64 = (1..=k).map(f64::from).product();
-        (if k % 2 == 0 { FRAC_2_SQRT_PI } else { -FRAC_2_SQRT_PI }) / (factorial * f64::from(2 * k + 1))
+        (if k.is_multiple_of(2) { FRAC_2_SQRT_PI } else { -FRAC_2_SQRT_PI }) / (factorial * f64::from(2 * k + 1))
     };
-    let series = polynomial(g, square, economised(coefficient, 1.0));
+    let series = polynomial(g, square, economised(coefficient, Interval::FromZero(1.0)));
     let near = g.mul(size, series);
 
     let complement = complement(g, size, gaussian);

@@ -1,7 +1,7 @@
 //! ln(1 + x), eˣ − 1 and related functions, without cancellation at 0.
 
 use super::elementary::{one_scalar, two_scalars};
-use super::sinc::polynomial;
+use super::power_series::polynomial;
 use super::{Function, Lowered, Shape};
 use crate::graph::{Form, Graph, NodeId, Op, Primitive, Rule};
 

@@ -2,7 +2,7 @@
 
 use super::elementary::one_scalar;
 use super::exponential::expm1;
-use super::sinc::polynomial;
+use super::power_series::polynomial;
 use super::{Function, Lowered};
 use crate::graph::{Form, Graph, NodeId, Primitive, Rule};
 

@@ -17,6 +17,7 @@ mod logic;
 mod loss;
 mod parallelogram;
 mod polar;
+mod power_series;
 mod quaternion;
 mod remainder;
 mod rotated;
@@ -204,8 +205,8 @@ pub const RECOGNISERS: &[Recogniser] = &[
         recognise: remainder::recognise_sum,
     },
     Recogniser {
-        spelling: "(exp(x) - 1 - x) / x^2, sin(x) / x, log(1 + x) / x, …",
-        form: "the rest of the Taylor series over a power of x, regular at 0",
+        spelling: "(exp(x) - 1 - x) / x^2, sin(x) / x, log(1 + x) / x, x * y / x, …",
+        form: "the rest of the Taylor series over a power of x, regular at 0; without common factors",
         ending: Ending::WrittenQuotient,
         recognise: remainder::recognise_quotient,
     },

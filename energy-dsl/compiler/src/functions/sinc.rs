@@ -4,6 +4,7 @@
 //! yᵏ⁻ᵐ/(2k+1)! is used.
 
 use super::elementary::one_scalar;
+use super::power_series::{Interval, economised, polynomial};
 use super::{Function, Lowered};
 use crate::graph::{Form, Graph, NodeId, Primitive, Rule};
 
@@ -118,60 +119,8 @@ fn cosine_series(g: &mut Graph, y: NodeId, below: f64) -> NodeId {
     g.add(one, product)
 }
 
-/// Returns Σ cₖ yᵏ by Horner's rule.
-pub(super) fn polynomial(g: &mut Graph, y: NodeId, mut coefficients: Vec<f64>) -> NodeId {
-    let mut sum = g.constant(coefficients.pop().expect("a polynomial has coefficients"));
-    for coefficient in coefficients.into_iter().rev() {
-        let (coefficient, product) = (g.constant(coefficient), g.mul(y, sum));
-        sum = g.add(coefficient, product);
-    }
-    sum
-}
-
-/// Returns a power series on [0, `below`] as a polynomial of low degree (Lanczos' economisation). The term of highest
-/// degree is replaced by lower ones, using y² times the Chebyshev polynomial with the same leading coefficient, while
-/// this changes the sum by at most 2⁻⁵⁶ of its first term. The first two terms stay: rounding them again would cost
-/// more.
-pub(super) fn economised(coefficient: impl Fn(i32) -> f64, below: f64) -> Vec<f64> {
-    let budget = coefficient(0).abs() * 2.0_f64.powi(-56);
-    let negligible = |k: i32| coefficient(k).abs() * below.powi(k) < budget * 2.0_f64.powi(-10);
-    let last = (0..).find(|&k| negligible(k)).expect("a series converges");
-    let mut coefficients: Vec<f64> = (0..last).map(&coefficient).collect();
-    let mut error = 0.0;
-    while coefficients.len() > 3 {
-        let degree = coefficients.len() - 3;
-        let chebyshev = shifted_chebyshev(degree, below);
-        let factor = coefficients[degree + 2] / chebyshev[degree];
-        error += factor.abs() * below * below;
-        if error > budget {
-            break;
-        }
-        coefficients[2..].iter_mut().zip(&chebyshev).for_each(|(c, t)| *c -= factor * t);
-        coefficients.pop();
-    }
-    coefficients
-}
-
-/// Returns the coefficients of T_n(2y/b − 1), which stays within ±1 on [0, b].
-fn shifted_chebyshev(n: usize, b: f64) -> Vec<f64> {
-    // T₀ and T₋₁ = T₁, then T_{m+1}(x) = 2x T_m(x) − T_{m−1}(x).
-    let (mut before, mut at) = (vec![-1.0, 2.0 / b], vec![1.0]);
-    for _ in 0..n {
-        let mut next = vec![0.0; at.len() + 1];
-        for (k, &c) in at.iter().enumerate() {
-            next[k] -= 2.0 * c;
-            next[k + 1] += 4.0 / b * c;
-        }
-        for (k, &c) in before.iter().enumerate() {
-            next[k] -= c;
-        }
-        (before, at) = (at, next);
-    }
-    at
-}
-
 /// Selects the series of Sₘ where y < `below`, else `direct`.
-fn near_zero(g: &mut Graph, y: NodeId, below: f64, order: i32, direct: NodeId) -> NodeId {
+fn near_zero(g: &mut Graph, y: NodeId, below: f64, order: u32, direct: NodeId) -> NodeId {
     let series = polynomial(g, y, coefficients(below, order));
     let below = g.constant(below);
     let near = g.less(y, below);
@@ -179,15 +128,15 @@ fn near_zero(g: &mut Graph, y: NodeId, below: f64, order: i32, direct: NodeId) -
 }
 
 /// Returns the coefficients of the series of Sₘ for y ≤ `below`.
-fn coefficients(below: f64, order: i32) -> Vec<f64> {
+fn coefficients(below: f64, order: u32) -> Vec<f64> {
     // (−1)ᵏ k!/(k−m)!/(2k+1)!, from k = m on.
-    let coefficient = |power: i32| {
+    let coefficient = |power: u32| {
         let k = power + order;
         let falling: f64 = (power + 1..=k).map(f64::from).product();
         let factorial: f64 = (1..=2 * k + 1).map(f64::from).product();
-        (if k % 2 == 0 { 1.0 } else { -1.0 }) * falling / factorial
+        (if k.is_multiple_of(2) { 1.0 } else { -1.0 }) * falling / factorial
     };
-    economised(coefficient, below)
+    economised(coefficient, Interval::FromZero(below))
 }
 
 /// Returns S₁ as a rule of y, so that it can be differentiated.

@@ -11,11 +11,10 @@ use crate::graph::{Graph, NodeId, Op, Primitive};
 
 /// Returns the mask where the argument of a logarithm, a root or a power is negative by more than its rounding errors;
 /// `None` if that is impossible.
-pub(super) fn outside(g: &mut Graph, roots: &[(NodeId, u8)]) -> Option<NodeId> {
-    let uses = Uses::of(g, roots.iter().map(|&(root, _)| root));
+pub(super) fn outside(g: &mut Graph, uses: &Uses) -> Option<NodeId> {
     let mut magnitudes = Magnitudes::default();
     let mut masks = Vec::new();
-    for (node, used) in uses.0 {
+    for (&node, used) in &uses.0 {
         let Some(argument) = domain(g, node) else { continue };
         let (zero, bound) = (g.constant(0.0), magnitudes.rounding_bound(g, argument));
         let least = g.sub(zero, bound);
@@ -26,7 +25,7 @@ pub(super) fn outside(g: &mut Graph, roots: &[(NodeId, u8)]) -> Option<NodeId> {
             let undefined = g.not(is_number);
             mask = g.and(mask, undefined);
         }
-        masks.push(g.and(mask, used));
+        masks.push(g.and(mask, used.mask));
     }
     masks.into_iter().reduce(|a, b| g.or(a, b))
 }
@@ -48,48 +47,60 @@ fn domain(g: &mut Graph, node: NodeId) -> Option<NodeId> {
 }
 
 /// Returns the mask where a primitive is a convention without a limit; `None` if that is impossible.
-pub(super) fn without_limit(g: &mut Graph, roots: &[(NodeId, u8)]) -> Option<NodeId> {
+pub(super) fn without_limit(g: &mut Graph, uses: &Uses) -> Option<NodeId> {
     let mut masks = BTreeSet::new();
-    for &(root, order) in roots {
-        for (node, used) in Uses::of(g, [root]).0 {
-            let flags = g.rule(node).map(|rule| rule.flags.clone()).unwrap_or_default();
-            for flag in flags.into_iter().filter(|flag| flag.definite && flag.order <= order) {
-                masks.insert(g.and(flag.mask, used));
-            }
+    for (&node, used) in &uses.0 {
+        let flags = g.rule(node).map(|rule| rule.flags.clone()).unwrap_or_default();
+        for flag in flags.into_iter().filter(|flag| flag.definite && flag.order <= used.order) {
+            masks.insert(g.and(flag.mask, used.mask));
         }
     }
     masks.into_iter().reduce(|a, b| g.or(a, b))
 }
 
-/// The operations of a formula, each with the mask where its result is used.
-struct Uses(BTreeMap<NodeId, NodeId>);
+/// The use of an operation's result.
+#[derive(Clone, Copy)]
+struct Use {
+    /// Where it is used.
+    mask: NodeId,
+    /// The highest order of its derivatives.
+    order: u8,
+}
+
+/// The operations of formulas that are differentiated up to some order. A robust primitive counts as one.
+pub(super) struct Uses(BTreeMap<NodeId, Use>);
 
 impl Uses {
-    fn of(g: &mut Graph, roots: impl IntoIterator<Item = NodeId>) -> Self {
-        let roots: Vec<NodeId> = roots.into_iter().collect();
-        let always = g.truth(true);
-        let mut masks: BTreeMap<NodeId, NodeId> = roots.iter().map(|&root| (root, always)).collect();
+    pub(super) fn of(g: &mut Graph, roots: &[(NodeId, u8)]) -> Self {
+        let (always, mut uses) = (g.truth(true), Self(BTreeMap::new()));
+        roots.iter().for_each(|&(root, order)| uses.add(g, root, Use { mask: always, order }));
+        let roots: Vec<NodeId> = roots.iter().map(|&(root, _)| root).collect();
         // Operands have smaller numbers than their users.
         for node in operations(g, &roots).into_iter().rev() {
-            let Some(&used) = masks.get(&node) else { continue };
-            let mut add = |g: &mut Graph, operand: NodeId, mask: NodeId| {
-                let known = masks.get(&operand).copied();
-                let mask = known.map_or(mask, |known| g.or(known, mask));
-                masks.insert(operand, mask);
-            };
+            let Some(&used) = uses.0.get(&node) else { continue };
             match (g.rule(node), g.op(node)) {
                 (Some(rule), _) => {
                     let operands: Vec<NodeId> = rule.arguments.iter().chain(&rule.inner).copied().collect();
-                    operands.into_iter().for_each(|operand| add(g, operand, used));
+                    operands.into_iter().for_each(|operand| uses.add(g, operand, used));
                 }
                 (None, Op::Select(mask, yes, no)) => {
                     let opposite = g.not(mask);
-                    let (if_yes, if_no) = (g.and(used, mask), g.and(used, opposite));
-                    [(yes, if_yes), (no, if_no)].into_iter().for_each(|(node, mask)| add(g, node, mask));
+                    for (branch, taken) in [(yes, mask), (no, opposite)] {
+                        let mask = g.and(used.mask, taken);
+                        uses.add(g, branch, Use { mask, ..used });
+                    }
                 }
-                (None, op) => op.operands().for_each(|operand| add(g, operand, used)),
+                (None, op) => op.operands().for_each(|operand| uses.add(g, operand, used)),
             }
         }
-        Self(masks)
+        uses
+    }
+
+    fn add(&mut self, g: &mut Graph, node: NodeId, used: Use) {
+        let joined = match self.0.get(&node) {
+            Some(&Use { mask, order }) => Use { mask: g.or(mask, used.mask), order: order.max(used.order) },
+            None => used,
+        };
+        self.0.insert(node, joined);
     }
 }

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use super::domain::{outside, without_limit};
+use super::domain::{Uses, outside, without_limit};
 use crate::graph::{Graph, NodeId, Op};
 use energy_runtime::Flag;
 
@@ -11,11 +11,11 @@ use energy_runtime::Flag;
 pub(super) struct Hazards {
     /// Inputs at which a result may be a convention: degenerate, kink. The general path looks closer.
     pub(super) flags: [Option<NodeId>; 2],
-    /// Where all operands are of moderate size and away from singularities; `None` if they always are.
+    /// The mask where all operands are of moderate size and away from singularities; `None` if they always are.
     pub(super) sound: Option<NodeId>,
-    /// Where the formula is not defined; `None` if it always is.
+    /// The mask where the formula is not defined; `None` if it always is.
     pub(super) outside: Option<NodeId>,
-    /// Where a result is a convention without a limit.
+    /// The mask where a result is a convention without a limit.
     pub(super) definite: Option<NodeId>,
 }
 
@@ -134,7 +134,8 @@ impl Hazards {
 
 /// Returns the hazards of derivatives of `roots` up to the given orders.
 pub(super) fn hazards(g: &mut Graph, roots: &[(NodeId, u8)]) -> Hazards {
-    let mut found = Hazards { outside: outside(g, roots), definite: without_limit(g, roots), ..Hazards::default() };
+    let uses = Uses::of(g, roots);
+    let mut found = Hazards { outside: outside(g, &uses), definite: without_limit(g, &uses), ..Hazards::default() };
     for &(root, order) in roots {
         for node in operations(g, &[root]) {
             match g.rule(node) {

@@ -6,6 +6,8 @@ mod hazards;
 mod magnitude;
 mod range;
 
+use std::collections::BTreeSet;
+
 use crate::check::Program;
 use crate::diff::{Coordinates, Moving, Plan, SecondOrder, first_order, hessian_vector, only_dihedral, second_order};
 use crate::graph::{Graph, Input, NodeId, Op, count, general, ordinary, with_signs_inside};
@@ -40,9 +42,9 @@ pub struct General {
     pub groups: Vec<Vec<NodeId>>,
     /// Masks of inputs at which a result may be a convention: degenerate, kink. Rays through the input decide.
     pub flags: [Option<NodeId>; 2],
-    /// Mask of inputs outside of the formula's domain; `None` if there are none.
+    /// Mask of inputs outside of the formula's domain; `None` if all inputs are inside.
     pub outside: Option<NodeId>,
-    /// Mask of inputs at which a result is a convention without a limit; `None` if there are none.
+    /// Mask of inputs at which a result is a convention without a limit; `None` if that is impossible.
     pub definite: Option<NodeId>,
 }
 
@@ -131,7 +133,9 @@ impl Whole {
         let (values, derivatives) = self.reduced.split_at(values);
         let tests = Tests::of(g, guards, derivatives);
         guards.extend(tests.guards(g));
-        let all = [values, &tests.results].concat();
+        // A result and its opposite would cancel.
+        let all: BTreeSet<NodeId> = values.iter().chain(&tests.results).map(|&result| g.magnitude(result).0).collect();
+        let all: Vec<NodeId> = all.into_iter().collect();
         let (sum, infinity) = (g.pairwise_sum(&all), g.constant(f64::INFINITY));
         let size = g.abs(sum);
         g.less(size, infinity)
@@ -149,7 +153,7 @@ impl Whole {
         let ordinary = self.with(g, &nodes);
         let Hazards { flags, sound, .. } = ordinary.hazards;
         let unflagged = flags.into_iter().flatten().map(|flag| g.not(flag)).collect::<Vec<_>>();
-        // Outside of the domain, results are no numbers: nothing else guards against them.
+        // Outside of the domain, results are not numbers, and nothing else guards against that.
         let always = outside.map(|_| g.truth(true));
         let mut guards: Vec<NodeId> = moderate.into_iter().chain(sound).chain(unflagged).chain(always).collect();
         let finite = ordinary.is_finite(g, &mut guards);

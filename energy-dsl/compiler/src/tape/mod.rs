@@ -4,7 +4,7 @@ mod recorder;
 mod steps;
 
 use crate::check::Program;
-use crate::graph::{Input, NodeId};
+use crate::graph::{Graph, Input, NodeId};
 use crate::routines::{self, Routines};
 use crate::statements::Code;
 use energy_runtime::Kind;
@@ -21,16 +21,35 @@ pub(crate) struct RoutineCode {
     pub(crate) ordinary: Code,
     /// Whether a fault was planted in the ordinary path. The guard then does not share its statements.
     pub(crate) is_broken: bool,
-    /// The mask where the ordinary path suffices, and the path for other inputs.
-    general: Option<(Code, Code)>,
-    /// The mask of inputs outside of the domain; `None` if there are none.
-    outside: Option<Code>,
+    /// The path for inputs that the ordinary path does not suffice for.
+    general: Option<GeneralCode>,
     /// Whether the first group is of values, not of derivatives.
     values_first: bool,
     /// Whether the first group is an energy.
     is_energy: bool,
     /// Whether derivatives are added to each other when they are expanded to points.
     is_summed: bool,
+}
+
+/// The statements of a general path.
+#[derive(Clone, Debug)]
+struct GeneralCode {
+    /// The mask where the ordinary path suffices.
+    guard: Code,
+    path: Code,
+    /// The mask of inputs outside of the domain; `None` if all inputs are inside.
+    outside: Option<Code>,
+}
+
+impl GeneralCode {
+    fn new(graph: &Graph, general: &routines::General) -> Self {
+        let settled = [general.outside, general.definite];
+        Self {
+            guard: Code::guard(graph, general.ordinary),
+            path: Code::settling(graph, &general.groups, general.flags, settled),
+            outside: general.outside.map(|outside| Code::guard(graph, outside)),
+        }
+    }
 }
 
 impl RoutineCode {
@@ -40,16 +59,7 @@ impl RoutineCode {
             name: routine.name,
             ordinary: Code::new(graph, &routine.groups, routine.flags),
             is_broken: false,
-            general: routine.general.as_ref().map(|general| {
-                let settled = [general.outside, general.definite];
-                let path = Code::settling(graph, &general.groups, general.flags, settled);
-                (Code::guard(graph, general.ordinary), path)
-            }),
-            outside: routine
-                .general
-                .as_ref()
-                .and_then(|general| general.outside)
-                .map(|outside| Code::guard(graph, outside)),
+            general: routine.general.as_ref().map(|general| GeneralCode::new(graph, general)),
             values_first: routine.has_values(),
             is_energy: routine.is_energy(),
             is_summed: routine.name == "reduced_hessian" && routines.vectors.len() > 1,
@@ -65,7 +75,6 @@ impl RoutineCode {
             ordinary: Code::new(&rest.graph, outputs, [routines.refused, None]),
             is_broken: false,
             general: None,
-            outside: None,
             values_first: true,
             is_energy: false,
             is_summed: false,
@@ -74,11 +83,11 @@ impl RoutineCode {
 
     /// Writes the routine to a tape. `leading` are the inputs that come first.
     fn record(&self, leading: &[Input]) -> Result<tape::Routine, TooLarge> {
-        let guarded = self.general.as_ref().map(|(guard, _)| self.ordinary.with_guard(guard, !self.is_broken));
+        let guarded = self.general.as_ref().map(|general| self.ordinary.with_guard(&general.guard, !self.is_broken));
         let code = guarded.as_ref().unwrap_or(&self.ordinary);
         let mut inputs = leading.to_vec();
         // The mask of the domain is one of the path's results, so that it has no other inputs.
-        let others = self.general.as_ref().map(|(_, general)| inputs_of(general)).unwrap_or_default();
+        let others = self.general.as_ref().map(|general| inputs_of(&general.path)).unwrap_or_default();
         for input in inputs_of(code).into_iter().chain(others.iter().copied()) {
             if !inputs.contains(&input) {
                 inputs.push(input);
@@ -88,16 +97,11 @@ impl RoutineCode {
         let place = |input: &Input| inputs.iter().position(|other| other == input).expect("it was added");
         let general = match &self.general {
             None => None,
-            Some((_, code)) => {
-                let Recorded { tape, groups, flags, settled, .. } = record(code, &others)?;
+            Some(GeneralCode { path, outside, .. }) => {
+                let Recorded { tape, groups, flags, settled, .. } = record(path, &others)?;
                 let (values, results) = (groups[0].len(), groups.concat());
-                let outside = match &self.outside {
-                    None => None,
-                    Some(code) => {
-                        let Recorded { tape, guard, .. } = record(code, &others)?;
-                        guard.map(|guard| (tape, guard))
-                    }
-                };
+                let outside = outside.as_ref().map(|code| record(code, &others)).transpose()?;
+                let outside = outside.and_then(|Recorded { tape, guard, .. }| Some((tape, guard?)));
                 Some(General {
                     ordinary: ordinary.guard.expect("compiler bug: a general path has a guard"),
                     inputs: others
@@ -196,7 +200,8 @@ impl ElementCode {
     pub(crate) fn record_routine(&self, routine: &RoutineCode) -> Result<tape::Routine, TooLarge> {
         let coordinates = u16::try_from(self.coordinates).map_err(|_| TooLarge)?;
         let reads = |code: &Code| inputs_of(code).iter().any(|input| matches!(input, Input::Velocity(_)));
-        let paths = std::iter::once(&routine.ordinary).chain(routine.general.iter().flat_map(|(a, b)| [a, b]));
+        let paths = std::iter::once(&routine.ordinary)
+            .chain(routine.general.iter().flat_map(|general| [&general.guard, &general.path]));
         let velocities = if paths.into_iter().any(reads) { coordinates } else { 0 };
         let leading = (0..coordinates).map(Input::Position).chain((0..velocities).map(Input::Velocity));
         routine.record(&leading.collect::<Vec<_>>())

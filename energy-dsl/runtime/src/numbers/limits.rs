@@ -30,11 +30,11 @@ pub struct Roles<'a> {
 #[doc(hidden)]
 #[derive(Clone, Copy, Debug)]
 pub struct Care<T: Number> {
-    /// Where a result may be a convention.
+    /// Flags of results that may be conventions.
     pub flags: Flags<T>,
-    /// Where the formula is not defined: the logarithm of a negative number.
+    /// Inputs at which the formula is not defined, as the logarithm of a negative number.
     pub outside: T::Mask,
-    /// Where results are conventions without a limit.
+    /// Inputs at which results are conventions without a limit.
     pub definite: T::Mask,
 }
 
@@ -359,8 +359,8 @@ impl<'a> Rays<'a> {
         self.roles.groups.iter().map(range).collect()
     }
 
-    /// Returns the sizes that rounding errors of each group are relative to: its largest limit, or what its derivatives
-    /// contribute over the distance of the input from 0.
+    /// Returns the size of each group, which its rounding errors are relative to: its largest limit, or the contribution
+    /// of its derivatives over the distance of the input from 0.
     fn scales(&self) -> Vec<Unbounded<f64>> {
         let largest = |numbers: &mut dyn Iterator<Item = Unbounded<f64>>| numbers.fold(zero(), |a, b| a.max(b.abs()));
         let moving = self.inputs.iter().zip(self.roles.moves).filter(|(input, moves)| **moves && input.is_finite());

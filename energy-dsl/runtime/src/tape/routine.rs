@@ -92,7 +92,7 @@ pub struct General {
     pub flags: [Option<u16>; 2],
     /// Mask slots of inputs outside of the domain, and of conventions without a limit.
     pub settled: [Option<u16>; 2],
-    /// A tape over the same inputs with a mask slot: the inputs outside of the domain; `None` if there are none.
+    /// A tape over the same inputs with a mask slot: the inputs outside of the domain; `None` if all inputs are inside.
     pub outside: Option<(Tape, u16)>,
     /// Whether the first group is of values, not of derivatives.
     pub values_first: bool,

@@ -88,7 +88,7 @@ pub fn markdown(list: &[Measured]) -> String {
     text
 }
 
-/// Formats a measured error. All are measured, so 0 is no bound.
+/// Formats a measured error. All errors are measured: 0 means exact.
 fn relative(error: f64) -> String {
     if error == 0.0 { "exact".into() } else { format!("{error:.1e}") }
 }

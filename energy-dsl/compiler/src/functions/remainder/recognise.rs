@@ -197,15 +197,28 @@ fn built(g: &mut Graph, function: Function, factor: &Monomial) -> NodeId {
     }
 }
 
-/// Recognises a function with a zero at x = 0 over a power of x.
+/// Recognises a function with a zero at x = 0 over a power of x, and a quotient whose sides share a factor.
 pub(in super::super) fn recognise_quotient(g: &mut Graph, above: NodeId, below: NodeId) -> Option<NodeId> {
     let mut functions = Vec::new();
     functions_of(g, above, &mut functions);
     functions.retain(|function| function.k > 0 && g.varies(function.x));
-    let (function, factor) = functions.into_iter().find_map(|function| cancelled(g, above, below, function))?;
-    let rest = remainder(g, function.expansion, function.k, function.x);
-    let factor = factor.build(g);
-    Some(g.mul(factor, rest))
+    if let Some((function, factor)) = functions.into_iter().find_map(|function| cancelled(g, above, below, function)) {
+        let rest = remainder(g, function.expansion, function.k, function.x);
+        let factor = factor.build(g);
+        return Some(g.mul(factor, rest));
+    }
+    without_common_factor(g, above, below)
+}
+
+/// Cancels a factor that vanishes on both sides at the same inputs. The quotient has the limit there, but its derivatives
+/// would lose all digits.
+fn without_common_factor(g: &mut Graph, above: NodeId, below: NodeId) -> Option<NodeId> {
+    let [above, below] = [above, below].map(|side| Monomial::of(g, side, &[]));
+    let is_shared = |node: &NodeId| {
+        let powers = [&above, &below].map(|side| side.powers.get(node).copied().unwrap_or(0));
+        g.varies(*node) && powers.into_iter().all(|power| power > 0)
+    };
+    above.powers.keys().any(is_shared).then(|| above.times(&below, -1).build(g))
 }
 
 /// Returns Φₖ and its factor in a quotient; `None` if nothing cancels.

@@ -1,7 +1,7 @@
 //! The functions, their coefficients and recurrences.
 
 use super::super::exponential::{log1p, plain_expm1};
-use super::super::sinc::{economised, polynomial};
+use super::super::power_series::{Interval, economised, polynomial};
 use crate::graph::{Expansion, Graph, NodeId, Primitive, Rule};
 
 /// The power series of the logarithm is used where |x/(2 + x)| is below this bound.
@@ -117,7 +117,7 @@ fn near_or_far(g: &mut Graph, x: NodeId, below: f64, near: [NodeId; 3], far: [No
 fn exponential_near(g: &mut Graph, k: u32, x: NodeId) -> [NodeId; 3] {
     [0, 1, 2].map(|order| {
         let coefficient = |j: u32| falling(j + order, order) / factorial(j + order + k);
-        polynomial(g, x, symmetrically_economised(coefficient, exponential_below(k)))
+        polynomial(g, x, economised(coefficient, Interval::AroundZero(exponential_below(k))))
     })
 }
 
@@ -125,12 +125,12 @@ fn exponential_near(g: &mut Graph, k: u32, x: NodeId) -> [NodeId; 3] {
 fn trigonometric_near(g: &mut Graph, k: u32, x: NodeId) -> [NodeId; 3] {
     let y = g.mul(x, x);
     let [value, slope, curvature] = [0, 1, 2].map(|order: u32| {
-        let coefficient = |j: i32| {
-            let j = j as u32 + u32::from(order > 0);
+        let coefficient = |j: u32| {
+            let j = j + u32::from(order > 0);
             let sign = if j.is_multiple_of(2) { 1.0 } else { -1.0 };
             sign * falling(2 * j, order) / factorial(2 * j + k)
         };
-        polynomial(g, y, economised(coefficient, trigonometric_below(k).powi(2)))
+        polynomial(g, y, economised(coefficient, Interval::FromZero(trigonometric_below(k).powi(2))))
     });
     [value, g.mul(x, slope), curvature]
 }
@@ -142,7 +142,7 @@ fn logarithmic_near(g: &mut Graph, k: u32, z: NodeId, rest: NodeId) -> [NodeId; 
     [0, 1, 2].map(|order: u32| {
         let sign = if order == 1 { -1.0 } else { 1.0 };
         let coefficient = |n: u32| sign * falling(n + order, order) * moment(n, k + order);
-        let series = polynomial(g, z, symmetrically_economised(coefficient, LOGARITHM_BELOW));
+        let series = polynomial(g, z, economised(coefficient, Interval::AroundZero(LOGARITHM_BELOW)));
         factor = g.mul(factor, rest);
         g.mul(factor, series)
     })
@@ -160,42 +160,6 @@ fn moment(n: u32, k: u32) -> f64 {
 /// Returns n (n − 1) … with this number of factors.
 fn falling(n: u32, factors: u32) -> f64 {
     (0..factors).map(|i| f64::from(n) - f64::from(i)).product()
-}
-
-/// Returns a power series on [−`below`, `below`] as a polynomial of low degree (Lanczos' economisation): the term of
-/// highest degree is replaced by lower ones, using the Chebyshev polynomial with the same leading coefficient.
-fn symmetrically_economised(coefficient: impl Fn(u32) -> f64, below: f64) -> Vec<f64> {
-    let budget = coefficient(0).abs() * 2.0_f64.powi(-56);
-    let negligible = |j: u32| coefficient(j).abs() * below.powi(j as i32) < budget * 2.0_f64.powi(-10);
-    // Every other coefficient may be 0.
-    let last = (0..).find(|&j| negligible(j) && negligible(j + 1)).expect("a series converges");
-    let mut coefficients: Vec<f64> = (0..last).map(&coefficient).collect();
-    let mut error = 0.0;
-    while coefficients.len() > 3 {
-        // x² T_n(x/b) leaves the first two terms, which would be rounded again.
-        let degree = coefficients.len() - 3;
-        let chebyshev = chebyshev(degree, below);
-        let factor = coefficients[degree + 2] / chebyshev[degree];
-        error += factor.abs() * below * below;
-        if error > budget {
-            break;
-        }
-        coefficients[2..].iter_mut().zip(&chebyshev).for_each(|(c, t)| *c -= factor * t);
-        coefficients.pop();
-    }
-    coefficients
-}
-
-/// Returns the coefficients of T_n(x/b).
-fn chebyshev(n: usize, b: f64) -> Vec<f64> {
-    let (mut before, mut at) = (vec![0.0, 1.0 / b], vec![1.0]);
-    for _ in 0..n {
-        let mut next = vec![0.0; at.len() + 1];
-        at.iter().enumerate().for_each(|(j, c)| next[j + 1] += 2.0 / b * c);
-        before.iter().enumerate().for_each(|(j, c)| next[j] -= c);
-        (before, at) = (at, next);
-    }
-    at
 }
 
 /// φₖ and its derivatives by φⱼ₊₁ = (φⱼ − 1/j!)/x.

@@ -91,6 +91,15 @@ impl Grammar<'_> {
         }
     }
 
+    /// Adds a leaf, or a form with parts of less depth.
+    fn grow(&mut self, leaves: &[&str], forms: &[&str], depth: usize) {
+        let is_leaf = depth == 0 || self.random.below(3) == 0;
+        let form = self.random.pick(if is_leaf { leaves } else { forms });
+        // The index of a sum is a constant, as long as the matrix has rows.
+        let form = form.replace("@n", ["1", "2", "3"][self.random.below(3)]);
+        self.form(&form, depth.saturating_sub(1));
+    }
+
     fn scalar(&mut self, depth: usize) {
         const LEAVES: &[&str] = &["s[@i]", "F[@i][@i]", "@c", "@w", "@x", "E[@i][@i]", "(q - p)[@i]", "p.x", "J"];
         const FORMS: &[&str] = &[
@@ -143,11 +152,7 @@ impl Grammar<'_> {
             "{ let c = @c; dot(vector(1, 2, 3, c), vector(@s, 1, 2, c)) + norm(quat(1, 2, 3, c) * quat(@s, 1, 2, c)) }",
             "columns(q - p, r - p)[@i][1]",
         ];
-        let leaf = depth == 0 || self.random.below(4) == 0;
-        let form = self.random.pick(if leaf { LEAVES } else { FORMS });
-        // The index of a sum is a constant, as long as the matrix has rows.
-        let form = form.replace("@n", ["1", "2", "3"][self.random.below(3)]);
-        self.form(&form, depth.saturating_sub(1));
+        self.grow(LEAVES, FORMS, depth);
     }
 
     fn vector(&mut self, depth: usize) {
@@ -162,9 +167,7 @@ impl Grammar<'_> {
             "vector(@s, @x, @c)",
             "gradient(dot(@v, p), p)",
         ];
-        let leaf = depth == 0 || self.random.below(3) == 0;
-        let form = self.random.pick(if leaf { LEAVES } else { FORMS });
-        self.form(&form, depth.saturating_sub(1));
+        self.grow(LEAVES, FORMS, depth);
     }
 
     fn matrix(&mut self, depth: usize) {
@@ -179,9 +182,7 @@ impl Grammar<'_> {
             "columns(@v, @V, @v)",
             "(@x * @m)",
         ];
-        let leaf = depth == 0 || self.random.below(3) == 0;
-        let form = self.random.pick(if leaf { LEAVES } else { FORMS });
-        self.form(&form, depth.saturating_sub(1));
+        self.grow(LEAVES, FORMS, depth);
     }
 }
 

@@ -24,7 +24,7 @@ use symmetry::{Branches, conditions};
 
 /// Singular values closer than this part of the largest one are equal up to rounding.
 const ROUNDING: f64 = 4e-15;
-/// Of functions with more conditions, the branches are not looked at: their number doubles with each.
+/// Functions with more conditions are taken whole: the number of branches doubles with each condition.
 const MOST_CONDITIONS: usize = 5;
 
 /// Turns functions of singular values into rules where they meet other moving numbers.
