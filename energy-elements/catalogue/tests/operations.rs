@@ -27,7 +27,7 @@ fn flat_bending_has_a_constant_hessian() {
 
 #[test]
 fn hessians_stay_small() {
-    for (name, most) in [("HookeSpring", 68), ("HairBend", 230), ("QuadraticHinge", 750)] {
+    for (name, most) in [("HookeSpring", 68), ("HairBend", 190), ("QuadraticHinge", 540)] {
         let count = operations(find(name).unwrap().declaration, "hessian");
         assert!(count <= most, "{name}: {count} operations, expected at most {most}");
     }

@@ -118,11 +118,16 @@ impl Graph {
         self.node(Op::IsModerate(a, degree))
     }
 
-    /// Creates a constant that depends on the precision of the number type.
-    pub fn by_precision(&mut self, double: f64, single: f64) -> NodeId {
+    /// Creates the mask of number types with the precision of doubles, or more. Compilers fold it.
+    pub fn is_double(&mut self) -> NodeId {
         // In single precision, the second number is 1.
         let [one, more] = [1.0, 1.0 + 2.0_f64.powi(-30)].map(|x| self.constant(x));
-        let is_double = self.less(one, more);
+        self.less(one, more)
+    }
+
+    /// Creates a constant that depends on the precision of the number type.
+    pub fn by_precision(&mut self, double: f64, single: f64) -> NodeId {
+        let is_double = self.is_double();
         let [double, single] = [double, single].map(|x| self.constant(x));
         self.select(is_double, double, single)
     }

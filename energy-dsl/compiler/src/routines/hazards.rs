@@ -20,7 +20,7 @@ pub(super) struct Hazards {
 }
 
 /// Operands up to 2²⁴⁰ (2³⁶ in single precision): their cubes, and those of their reciprocals, are numbers.
-const DEGREE: u8 = 3;
+pub(super) const DEGREE: u8 = 3;
 /// e⁸⁰ is a number in single precision, too.
 const LARGEST_EXPONENT: f64 = 80.0;
 

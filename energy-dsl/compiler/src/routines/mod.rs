@@ -6,8 +6,6 @@ mod hazards;
 mod magnitude;
 mod range;
 
-use std::collections::BTreeSet;
-
 use crate::check::Program;
 use crate::diff::{Coordinates, Moving, Plan, SecondOrder, first_order, hessian_vector, only_dihedral, second_order};
 use crate::graph::{Graph, Input, NodeId, Op, count, general, ordinary, with_signs_inside};
@@ -133,12 +131,7 @@ impl Whole {
         let (values, derivatives) = self.reduced.split_at(values);
         let tests = Tests::of(g, guards, derivatives);
         guards.extend(tests.guards(g));
-        // A result and its opposite would cancel.
-        let all: BTreeSet<NodeId> = values.iter().chain(&tests.results).map(|&result| g.magnitude(result).0).collect();
-        let all: Vec<NodeId> = all.into_iter().collect();
-        let (sum, infinity) = (g.pairwise_sum(&all), g.constant(f64::INFINITY));
-        let size = g.abs(sum);
-        g.less(size, infinity)
+        tests.finite(g, values)
     }
 
     fn split(self, g: &mut Graph) -> Routine {

@@ -1,32 +1,43 @@
 //! Finds results that may overflow although the values of a routine do not.
 //!
-//! Guards bound lengths and their reciprocals. From these, bounds on the exponents of all operations follow, if one more
-//! guard keeps parameters and other lengths far from overflow. Results within the range of the type are then finite. The
-//! others are tested when they are known.
+//! Guards bound lengths, and other operands with their reciprocals. From these, bounds on the exponents of all operations
+//! follow, if one more guard keeps parameters and other lengths far from overflow. Results within the range of the type
+//! are then finite. The others are tested when they are known.
+//!
+//! Primitives divide lengths by lengths: a direction d/‖d‖ has size 1, a curvature ∂n/∂x has that of 1/‖d‖. So lengths
+//! count by their degree, as if those of one element were of one size, and their powers cancel.
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::graph::{Graph, Input, NodeId, Op, reachable};
 
-/// Guarded parameters, and their exponent: in double and in single precision.
-const LARGEST_PARAMETER: (f64, f64) = (1e120, 1e15);
-const PARAMETER: u32 = 55;
-/// Guarded lengths: 2⁸⁰ and 2¹². `IsModerate` has the same bounds.
-const LARGEST_LENGTH: (f64, f64) = ((1_u128 << 80) as f64, 4096.0);
-/// The exponent of a length. Exponents are those of single precision; in double precision, they are 80/12 of that.
-const LENGTH: u32 = 12;
-/// Exponents up to this one leave room for sums of a hundred terms.
-const LARGEST: u32 = 120;
+/// Exponents in a precision.
+#[derive(Clone, Copy)]
+struct Range {
+    /// The largest exponent of a result. It leaves room for sums of a hundred terms.
+    largest: u32,
+    /// The exponent of guarded lengths. `IsModerate` has the same bound.
+    length: u32,
+    /// The exponent of guarded parameters.
+    parameter: u32,
+}
+
+const DOUBLE: Range = Range { largest: 1016, length: 80, parameter: 200 };
+const SINGLE: Range = Range { largest: 120, length: 12, parameter: 50 };
 /// The exponent of a number without a bound.
 const UNKNOWN: u32 = 1 << 16;
 /// The exponent of e⁸⁰, which guards allow.
 const EXPONENTIAL: u32 = 116;
+/// The degree of guards on operands that are not lengths.
+const OPERAND: u8 = super::hazards::DEGREE;
 
 /// Tests of the ordinary path of a routine.
 #[derive(Default)]
 pub(super) struct Tests {
     /// Results that must be finite.
-    pub(super) results: Vec<NodeId>,
+    results: Vec<NodeId>,
+    /// Results that must be finite in single precision. In double precision, they are.
+    single: Vec<NodeId>,
     /// Parameters that must be far from overflow.
     parameters: BTreeSet<NodeId>,
     /// Lengths that must be far from overflow.
@@ -37,18 +48,21 @@ impl Tests {
     /// Looks at derivatives on the ordinary path, whose guards hold. Without guards there is no other path for large
     /// inputs, so that results are tested instead. So they are if that takes fewer operations.
     pub(super) fn of(g: &Graph, guards: &[NodeId], derivatives: &[NodeId]) -> Self {
-        let analysis = Analysis::new(g, guards, derivatives);
+        let [double, single] = [DOUBLE, SINGLE].map(|range| Analysis::new(g, range, guards, derivatives));
         let (mut tests, mut others) = (Self::default(), Vec::new());
         for &derivative in derivatives {
-            let size = analysis.sizes[&g.resolve(derivative)];
-            if !size.is_product && size.exponent < UNKNOWN {
+            let [in_double, in_single] = [&double, &single].map(|analysis| analysis.sizes[&g.resolve(derivative)]);
+            if !in_double.is_product && in_double.exponent < UNKNOWN {
                 continue;
             }
-            if guards.is_empty() || size.exponent > LARGEST {
+            if guards.is_empty() || in_double.total(DOUBLE) > DOUBLE.largest {
                 tests.results.push(derivative);
                 continue;
             }
-            let (parameters, lengths) = analysis.inputs(size.inputs);
+            if in_single.total(SINGLE) > SINGLE.largest {
+                tests.single.push(derivative);
+            }
+            let (parameters, lengths) = double.inputs(in_double.inputs);
             tests.parameters.extend(parameters);
             if !lengths.is_empty() {
                 tests.lengths.extend(lengths);
@@ -58,6 +72,7 @@ impl Tests {
         // A square and its sum are two operations.
         if others.len() < 2 * tests.lengths.len() {
             tests.lengths.clear();
+            tests.single.retain(|derivative| !others.contains(derivative));
             tests.results.extend(others);
         }
         tests
@@ -66,22 +81,47 @@ impl Tests {
     /// Creates the masks where inputs are far from overflow.
     pub(super) fn guards(&self, g: &mut Graph) -> Vec<NodeId> {
         let mut guards = Vec::new();
-        for (inputs, (double, single)) in [(&self.parameters, LARGEST_PARAMETER), (&self.lengths, LARGEST_LENGTH)] {
+        let of_inputs: [(_, fn(Range) -> u32); 2] =
+            [(&self.parameters, |range| range.parameter), (&self.lengths, |range| range.length)];
+        for (inputs, exponent) in of_inputs {
             if !inputs.is_empty() {
                 let square = g.sum_of_squares(&inputs.iter().copied().collect::<Vec<_>>());
-                let largest = g.by_precision(double * double, single * single);
+                let [double, single] = [DOUBLE, SINGLE].map(|range| 4.0_f64.powi(exponent(range) as i32));
+                let largest = g.by_precision(double, single);
                 guards.push(g.less(square, largest));
             }
         }
         guards
     }
+
+    /// Creates the mask where the values and all tested results are finite.
+    pub(super) fn finite(&self, g: &mut Graph, values: &[NodeId]) -> NodeId {
+        let finite = is_finite(g, values.iter().chain(&self.results));
+        if self.single.is_empty() {
+            return finite;
+        }
+        let (in_single, is_double) = (is_finite(g, &self.single), g.is_double());
+        let holds = g.or(is_double, in_single);
+        g.and(finite, holds)
+    }
 }
 
-/// A bound on the size of an expression.
+/// Creates the mask where the sum of some results is finite.
+fn is_finite<'a>(g: &mut Graph, results: impl IntoIterator<Item = &'a NodeId>) -> NodeId {
+    // A result and its opposite would cancel.
+    let results: BTreeSet<NodeId> = results.into_iter().map(|&result| g.magnitude(result).0).collect();
+    let results: Vec<NodeId> = results.into_iter().collect();
+    let (sum, infinity) = (g.pairwise_sum(&results), g.constant(f64::INFINITY));
+    let size = g.abs(sum);
+    g.less(size, infinity)
+}
+
+/// A bound on the size of an expression: 2^exponent times powers of a length.
 #[derive(Clone, Copy, Default)]
 struct Size {
-    /// Its size is at most 2^exponent.
     exponent: u32,
+    /// Twice the least and the largest exponent of the length.
+    degrees: [i32; 2],
     /// The unbounded inputs that it depends on, as bits.
     inputs: u128,
     /// Whether it has a product that may overflow where its factors do not.
@@ -93,9 +133,21 @@ impl Size {
         Self { exponent, ..Self::default() }
     }
 
+    fn of_length(degree: i32) -> Self {
+        Self { degrees: [degree; 2], ..Self::default() }
+    }
+
+    /// Returns the exponent for lengths of an exponent.
+    fn total(self, range: Range) -> u32 {
+        let degree = self.degrees.into_iter().map(i32::unsigned_abs).fold(0, u32::max);
+        self.exponent.saturating_add(degree.saturating_mul(range.length) / 2)
+    }
+
     fn plus(self, other: Self) -> Self {
+        let ([least, largest], [a, b]) = (self.degrees, other.degrees);
         Self {
             exponent: self.exponent.max(other.exponent),
+            degrees: [least.min(a), largest.max(b)],
             inputs: self.inputs | other.inputs,
             is_product: self.is_product || other.is_product,
         }
@@ -104,65 +156,70 @@ impl Size {
     fn times(self, other: Self) -> Self {
         Self {
             exponent: self.exponent.saturating_add(other.exponent).min(UNKNOWN),
-            is_product: self.is_product || other.is_product || self.exponent > 0 && other.exponent > 0,
+            degrees: [0, 1].map(|end| self.degrees[end].saturating_add(other.degrees[end])),
+            is_product: self.is_product || other.is_product || !self.is_small() && !other.is_small(),
             ..self.plus(other)
         }
     }
 
+    fn is_small(self) -> bool {
+        (self.exponent, self.degrees) == (0, [0, 0])
+    }
+
     fn root(self) -> Self {
-        Self { exponent: self.exponent.div_ceil(2), ..self }
+        Self { exponent: self.exponent.div_ceil(2), degrees: self.degrees.map(|degree| degree / 2), ..self }
     }
 }
 
 /// The sizes of all operations of a routine.
-#[derive(Default)]
 struct Analysis {
+    range: Range,
     /// Inputs without guards, in the order of their bits, and whether they are parameters.
     unbounded: Vec<(NodeId, bool)>,
-    /// Exponents of numbers that guards bound, and of their reciprocals.
-    moderate: BTreeMap<NodeId, u32>,
-    /// Exponents of numbers that guards bound from above only.
-    bounded: BTreeMap<NodeId, u32>,
+    /// Sizes of numbers that guards bound, and of their reciprocals.
+    moderate: BTreeMap<NodeId, [Size; 2]>,
     sizes: BTreeMap<NodeId, Size>,
 }
 
 impl Analysis {
-    fn new(g: &Graph, guards: &[NodeId], results: &[NodeId]) -> Self {
-        let mut analysis = Self::default();
+    fn new(g: &Graph, range: Range, guards: &[NodeId], results: &[NodeId]) -> Self {
+        let mut analysis = Self { range, unbounded: Vec::new(), moderate: BTreeMap::new(), sizes: BTreeMap::new() };
         analysis.read(g, guards);
         for node in reachable(g, results) {
-            let known = analysis.moderate.get(&node).or(analysis.bounded.get(&node)).copied();
-            let size = known.map_or_else(|| analysis.of(g, node), Size::of);
+            let known = analysis.moderate.get(&node).map(|[size, _]| *size);
+            let size = known.unwrap_or_else(|| analysis.of(g, node));
             analysis.sizes.insert(node, size);
         }
         analysis
     }
 
-    /// Reads the bounds that guards give: of moderate numbers, and of the terms of sums of squares.
+    /// Reads the bounds that guards give: of operands, of the lengths of vectors, and of their components.
     fn read(&mut self, g: &Graph, guards: &[NodeId]) {
-        let (mut masks, mut sums) = (guards.to_vec(), Vec::new());
+        let mut masks = guards.to_vec();
         while let Some(mask) = masks.pop() {
             match g.op(mask) {
                 Op::And(a, b) => masks.extend([a, b]),
-                Op::IsModerate(a, degree) => {
-                    let (a, exponent) = (g.resolve(a), LENGTH * u32::from(degree));
-                    sums.push((a, exponent));
-                    let number = if let Op::Abs(number) = g.op(a) { number } else { a };
-                    self.moderate.extend([a, g.resolve(number)].map(|node| (node, exponent)));
+                Op::IsModerate(a, OPERAND) => {
+                    let size = Size::of(self.range.length * u32::from(OPERAND));
+                    let number = if let Op::Abs(number) = g.op(g.resolve(a)) { number } else { a };
+                    self.moderate.extend([a, number].map(|node| (g.resolve(node), [size, size])));
                 }
+                Op::IsModerate(a, degree) => self.read_lengths(g, g.resolve(a), i32::from(degree)),
                 _ => {}
             }
         }
-        while let Some((sum, exponent)) = sums.pop() {
-            self.bounded.insert(sum, exponent);
+    }
+
+    /// Reads the bounds of a power of a length, and of the terms of a sum of squares.
+    fn read_lengths(&mut self, g: &Graph, power: NodeId, degree: i32) {
+        self.moderate.insert(power, [2 * degree, -2 * degree].map(Size::of_length));
+        let mut sums = vec![power];
+        while let Some(sum) = sums.pop() {
             match g.op(sum) {
-                Op::Add(a, b) => {
-                    let terms = [a, b].map(|term| g.resolve(term));
-                    if terms.iter().all(|&term| is_square(g, term)) {
-                        sums.extend(terms.map(|term| (term, exponent)));
-                    }
+                Op::Add(a, b) if is_square(g, sum) => sums.extend([a, b].map(|term| g.resolve(term))),
+                Op::Mul(a, b) if a == b => {
+                    self.moderate.entry(g.resolve(a)).or_insert([Size::of_length(degree), Size::of(UNKNOWN)]);
                 }
-                Op::Mul(a, b) if a == b => _ = self.bounded.insert(g.resolve(a), exponent.div_ceil(2)),
                 _ => {}
             }
         }
@@ -194,10 +251,16 @@ impl Analysis {
             | Op::MulSub(a, b, c)
             | Op::NegMulAdd(a, b, c)
             | Op::NegMulSub(a, b, c) => size(a).times(size(b)).plus(size(c)),
-            Op::Div(a, b) => size(a).times(Size::of(self.reciprocal(g, b))),
+            Op::Div(a, b) => size(a).times(self.reciprocal(g, b)),
             Op::Sqrt(a) => size(a).root(),
             Op::Exp(_) | Op::Pow(..) => Size::of(EXPONENTIAL),
-            // Rounding errors are smaller than the results that they belong to. Sines, angles and logarithms are small.
+            // Rounding errors are smaller than the results that they belong to.
+            Op::SumError(a, b) => size(a).plus(size(b)),
+            Op::ProductError(a, b) => size(a).times(size(b)),
+            Op::RootError(_, root) => size(root),
+            Op::DifferenceError(a, b) if is_moving_input(g, a) && is_moving_input(g, b) => Size::of_length(2),
+            Op::DifferenceError(a, b) => size(a).plus(size(b)),
+            // Sines, angles and logarithms are small.
             _ => Size::default(),
         }
     }
@@ -206,28 +269,39 @@ impl Analysis {
         let bit = self.unbounded.len();
         self.unbounded.push((node, is_parameter));
         match bit {
-            0..128 => Size { inputs: 1 << bit, ..Size::of(if is_parameter { PARAMETER } else { LENGTH }) },
+            0..128 => Size {
+                inputs: 1 << bit,
+                ..Size::of(if is_parameter { self.range.parameter } else { self.range.length })
+            },
             _ => Size::of(UNKNOWN),
         }
     }
 
-    /// Returns the exponent of 1/b.
-    fn reciprocal(&self, g: &Graph, b: NodeId) -> u32 {
+    /// Returns the size of 1/b.
+    fn reciprocal(&self, g: &Graph, b: NodeId) -> Size {
         let b = g.resolve(b);
-        if let Some(&exponent) = self.moderate.get(&b) {
-            return exponent;
+        if let Some([_, reciprocal]) = self.moderate.get(&b) {
+            return *reciprocal;
         }
         match g.op(b) {
-            Op::Constant(bits) => exponent_of(1.0 / f64::from_bits(bits)),
+            Op::Constant(bits) => Size::of(exponent_of(1.0 / f64::from_bits(bits))),
             Op::Neg(a) | Op::Abs(a) => self.reciprocal(g, a),
-            Op::Sqrt(a) => self.reciprocal(g, a).div_ceil(2),
-            Op::Mul(x, y) => self.reciprocal(g, x).saturating_add(self.reciprocal(g, y)).min(UNKNOWN),
-            Op::Div(x, y) => {
-                let size = |operand: NodeId| self.sizes.get(&g.resolve(operand)).map_or(UNKNOWN, |size| size.exponent);
-                self.reciprocal(g, x).saturating_add(size(y)).min(UNKNOWN)
-            }
-            Op::Exp(_) => EXPONENTIAL,
-            _ => UNKNOWN,
+            Op::Sqrt(a) => self.reciprocal(g, a).root(),
+            Op::Mul(x, y) => self.reciprocal(g, x).times(self.reciprocal(g, y)),
+            Op::Div(x, y) => match self.sizes.get(&g.resolve(y)) {
+                Some(&size) => self.reciprocal(g, x).times(size),
+                None => Size::of(UNKNOWN),
+            },
+            Op::Exp(_) => Size::of(EXPONENTIAL),
+            // Primitives guard the sums of lengths that they divide by.
+            _ => match self.sizes.get(&b) {
+                Some(&Size { exponent: 0, degrees: [least, largest], inputs, .. })
+                    if least == largest && least != 0 =>
+                {
+                    Size { inputs, ..Size::of_length(-least) }
+                }
+                _ => Size::of(UNKNOWN),
+            },
         }
     }
 }
