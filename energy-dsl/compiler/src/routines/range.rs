@@ -5,7 +5,8 @@
 //! are then finite. The others are tested when they are known.
 //!
 //! Primitives divide lengths by lengths: a direction d/‖d‖ has size 1, a curvature ∂n/∂x has that of 1/‖d‖. So lengths
-//! count by their degree, as if those of one element were of one size, and their powers cancel.
+//! count by their degree, as if those of one element were of one size, and their powers cancel. Powers of lengths that
+//! are divided by, such as the area of a triangle, are guarded, too.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -42,6 +43,8 @@ pub(super) struct Tests {
     parameters: BTreeSet<NodeId>,
     /// Lengths that must be far from overflow.
     lengths: BTreeSet<NodeId>,
+    /// Divisors that must be of moderate size, and their degrees.
+    divisors: BTreeMap<NodeId, u8>,
 }
 
 impl Tests {
@@ -49,7 +52,7 @@ impl Tests {
     /// inputs, so that results are tested instead. So they are if that takes fewer operations.
     pub(super) fn of(g: &Graph, guards: &[NodeId], derivatives: &[NodeId]) -> Self {
         let [double, single] = [DOUBLE, SINGLE].map(|range| Analysis::new(g, range, guards, derivatives));
-        let (mut tests, mut others) = (Self::default(), Vec::new());
+        let (mut tests, mut others) = (Self::default(), BTreeSet::new());
         for &derivative in derivatives {
             let [in_double, in_single] = [&double, &single].map(|analysis| analysis.sizes[&g.resolve(derivative)]);
             if !in_double.is_product && in_double.exponent < UNKNOWN {
@@ -62,20 +65,30 @@ impl Tests {
             if in_single.total(SINGLE) > SINGLE.largest {
                 tests.single.push(derivative);
             }
-            let (parameters, lengths) = double.inputs(in_double.inputs);
-            tests.parameters.extend(parameters);
-            if !lengths.is_empty() {
-                tests.lengths.extend(lengths);
-                others.push(derivative);
+            for (node, unbounded) in double.inputs(in_double.inputs) {
+                match unbounded {
+                    Unbounded::Parameter => _ = tests.parameters.insert(node),
+                    Unbounded::Length => _ = tests.lengths.insert(node),
+                    Unbounded::Divisor(degree) => _ = tests.divisors.insert(node, degree),
+                }
+                if !matches!(unbounded, Unbounded::Parameter) {
+                    others.insert(derivative);
+                }
             }
         }
-        // A square and its sum are two operations.
-        if others.len() < 2 * tests.lengths.len() {
-            tests.lengths.clear();
-            tests.single.retain(|derivative| !others.contains(derivative));
-            tests.results.extend(others);
+        tests.with_the_cheaper(&others)
+    }
+
+    /// Tests results that depend on lengths instead of these lengths, if that takes fewer operations.
+    fn with_the_cheaper(mut self, results: &BTreeSet<NodeId>) -> Self {
+        // A square and its sum are two operations, and so are the two comparisons of a divisor.
+        if results.len() < 2 * (self.lengths.len() + self.divisors.len()) {
+            self.lengths.clear();
+            self.divisors.clear();
+            self.single.retain(|result| !results.contains(result));
+            self.results.extend(results);
         }
-        tests
+        self
     }
 
     /// Creates the masks where inputs are far from overflow.
@@ -90,6 +103,10 @@ impl Tests {
                 let largest = g.by_precision(double, single);
                 guards.push(g.less(square, largest));
             }
+        }
+        for (&divisor, &degree) in &self.divisors {
+            let size = if is_square(g, divisor) { divisor } else { g.abs(divisor) };
+            guards.push(g.is_moderate(size, degree));
         }
         guards
     }
@@ -162,6 +179,13 @@ impl Size {
         }
     }
 
+    /// Returns the degree of a positive power of a length.
+    fn power_of_length(self) -> Option<u8> {
+        let [least, largest] = self.degrees;
+        let is_power = self.exponent == 0 && least == largest && least > 0 && least % 2 == 0;
+        is_power.then(|| u8::try_from(least / 2).ok()).flatten()
+    }
+
     fn is_small(self) -> bool {
         (self.exponent, self.degrees) == (0, [0, 0])
     }
@@ -171,11 +195,20 @@ impl Size {
     }
 }
 
+/// What a number without a guard is.
+#[derive(Clone, Copy)]
+enum Unbounded {
+    Parameter,
+    Length,
+    /// A divisor: a power of a length.
+    Divisor(u8),
+}
+
 /// The sizes of all operations of a routine.
 struct Analysis {
     range: Range,
-    /// Inputs without guards, in the order of their bits, and whether they are parameters.
-    unbounded: Vec<(NodeId, bool)>,
+    /// Numbers without guards, in the order of their bits.
+    unbounded: Vec<(NodeId, Unbounded)>,
     /// Sizes of numbers that guards bound, and of their reciprocals.
     moderate: BTreeMap<NodeId, [Size; 2]>,
     sizes: BTreeMap<NodeId, Size>,
@@ -225,21 +258,21 @@ impl Analysis {
         }
     }
 
-    /// Returns the parameters and the lengths among inputs.
-    fn inputs(&self, inputs: u128) -> (Vec<NodeId>, Vec<NodeId>) {
-        let chosen =
-            self.unbounded.iter().enumerate().filter(|(bit, _)| inputs >> bit & 1 == 1).map(|(_, input)| *input);
-        let (parameters, lengths): (Vec<_>, Vec<_>) = chosen.partition(|(_, is_parameter)| *is_parameter);
-        let nodes = |list: Vec<(NodeId, bool)>| list.into_iter().map(|(node, _)| node).collect();
-        (nodes(parameters), nodes(lengths))
+    /// Returns the numbers without guards that a size depends on.
+    fn inputs(&self, inputs: u128) -> impl Iterator<Item = (NodeId, Unbounded)> {
+        self.unbounded.iter().enumerate().filter(move |(bit, _)| inputs >> bit & 1 == 1).map(|(_, &input)| input)
     }
 
     fn of(&mut self, g: &Graph, node: NodeId) -> Size {
         let size = |operand: NodeId| self.sizes[&g.resolve(operand)];
         match g.fused(node) {
-            Op::Input(Input::Position(_) | Input::Velocity(_)) => self.input(node, false),
-            Op::Sub(a, b) if is_moving_input(g, a) && is_moving_input(g, b) => self.input(node, false),
-            Op::Input(_) => self.input(node, true),
+            Op::Input(Input::Position(_) | Input::Velocity(_)) => {
+                self.unbounded(node, Unbounded::Length, Size::of_length(2))
+            }
+            Op::Sub(a, b) if is_moving_input(g, a) && is_moving_input(g, b) => {
+                self.unbounded(node, Unbounded::Length, Size::of_length(2))
+            }
+            Op::Input(_) => self.unbounded(node, Unbounded::Parameter, Size::of(self.range.parameter)),
             Op::Constant(bits) => Size::of(exponent_of(f64::from_bits(bits))),
             Op::Neg(a) | Op::Abs(a) => size(a),
             Op::Add(a, b) | Op::Sub(a, b) | Op::Min(a, b) | Op::Max(a, b) | Op::Select(_, a, b) => {
@@ -251,7 +284,10 @@ impl Analysis {
             | Op::MulSub(a, b, c)
             | Op::NegMulAdd(a, b, c)
             | Op::NegMulSub(a, b, c) => size(a).times(size(b)).plus(size(c)),
-            Op::Div(a, b) => size(a).times(self.reciprocal(g, b)),
+            Op::Div(a, b) => {
+                let numerator = size(a);
+                numerator.times(self.reciprocal(g, b))
+            }
             Op::Sqrt(a) => size(a).root(),
             Op::Exp(_) | Op::Pow(..) => Size::of(EXPONENTIAL),
             // Rounding errors are smaller than the results that they belong to.
@@ -265,20 +301,18 @@ impl Analysis {
         }
     }
 
-    fn input(&mut self, node: NodeId, is_parameter: bool) -> Size {
-        let bit = self.unbounded.len();
-        self.unbounded.push((node, is_parameter));
-        match bit {
-            0..128 => Size {
-                inputs: 1 << bit,
-                ..Size::of(if is_parameter { self.range.parameter } else { self.range.length })
-            },
-            _ => Size::of(UNKNOWN),
+    /// Returns the size that a number without a guard has once it is guarded.
+    fn unbounded(&mut self, node: NodeId, what: Unbounded, size: Size) -> Size {
+        let known = self.unbounded.iter().position(|&(other, _)| other == node);
+        let bit = known.unwrap_or(self.unbounded.len());
+        if known.is_none() {
+            self.unbounded.push((node, what));
         }
+        if bit < 128 { Size { inputs: 1 << bit, ..size } } else { Size::of(UNKNOWN) }
     }
 
     /// Returns the size of 1/b.
-    fn reciprocal(&self, g: &Graph, b: NodeId) -> Size {
+    fn reciprocal(&mut self, g: &Graph, b: NodeId) -> Size {
         let b = g.resolve(b);
         if let Some([_, reciprocal]) = self.moderate.get(&b) {
             return *reciprocal;
@@ -293,14 +327,9 @@ impl Analysis {
                 None => Size::of(UNKNOWN),
             },
             Op::Exp(_) => Size::of(EXPONENTIAL),
-            // Primitives guard the sums of lengths that they divide by.
-            _ => match self.sizes.get(&b) {
-                Some(&Size { exponent: 0, degrees: [least, largest], inputs, .. })
-                    if least == largest && least != 0 =>
-                {
-                    Size { inputs, ..Size::of_length(-least) }
-                }
-                _ => Size::of(UNKNOWN),
+            _ => match self.sizes.get(&b).and_then(|size| size.power_of_length()) {
+                Some(degree) => self.unbounded(b, Unbounded::Divisor(degree), Size::of_length(-2 * i32::from(degree))),
+                None => Size::of(UNKNOWN),
             },
         }
     }
