@@ -24,7 +24,7 @@ struct Range {
 }
 
 const DOUBLE: Range = Range { largest: 1016, length: 80, parameter: 200 };
-const SINGLE: Range = Range { largest: 120, length: 12, parameter: 50 };
+const SINGLE: Range = Range { largest: 120, length: 12, parameter: 46 };
 /// The exponent of a number without a bound.
 const UNKNOWN: u32 = 1 << 16;
 /// The exponent of e⁸⁰, which guards allow.
