@@ -2,6 +2,7 @@
 //! exponent.
 
 mod block_sum;
+mod bundle;
 mod cpu;
 mod elementary;
 mod flags;

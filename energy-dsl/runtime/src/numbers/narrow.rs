@@ -98,8 +98,16 @@ impl Search<'_> {
     }
 
     fn at(&self, slopes: Vec<f64>) -> Point {
-        let comparisons = Ray::compare(self.inputs, &slopes, self.along);
-        Point { difference: comparisons.get(self.comparison).copied().flatten(), slopes }
+        self.at_each(vec![slopes]).remove(0)
+    }
+
+    fn at_each(&self, rays: Vec<Vec<f64>>) -> Vec<Point> {
+        let comparisons = Ray::compare(self.inputs, &rays, self.along);
+        let point = |(slopes, comparisons): (Vec<f64>, Vec<Comparison>)| Point {
+            difference: comparisons.get(self.comparison).copied().flatten(),
+            slopes,
+        };
+        rays.into_iter().zip(comparisons).map(point).collect()
     }
 
     fn moving(&self) -> impl Iterator<Item = usize> {
@@ -167,9 +175,9 @@ impl Search<'_> {
                 true => slope + distance * super::limits::slope(1000 + number, i),
                 false => 0.0,
             });
-            self.at(moved.collect())
+            moved.collect()
         };
-        NEAR.iter().enumerate().map(ray).collect()
+        self.at_each(NEAR.iter().enumerate().map(ray).collect())
     }
 }
 
@@ -184,7 +192,8 @@ fn is_smaller(a: &Point, b: &Point) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::numbers::{Care, Flags, Number, Roles, settle};
+    use crate::numbers::bundle::Outcomes;
+    use crate::numbers::{Care, Flags, Mask, Number, Roles, settle};
 
     /// Returns whether a value with one derivative is marked as a kink at 0, where the derivative is 1.
     fn is_kink(inputs: usize, formula: impl Fn(&[Ray]) -> Vec<Ray>) -> bool {
@@ -192,7 +201,8 @@ mod tests {
         let flags = Flags { degenerate: false, kink: true };
         let care = Care { flags, outside: false, definite: false };
         let roles = Roles { moves: &vec![true; inputs], groups: &[1, 1], values_first: true, is_energy: true };
-        let flags = settle(&vec![Unbounded::of(0.0); inputs], roles, &mut results, care, &|x| Some(formula(x)));
+        let flags =
+            settle(&vec![Unbounded::of(0.0); inputs], roles, &mut results, care, &|x| (formula(x), Outcomes::none()));
         assert!(!flags.degenerate && results[1].to_scalar() == 1.0);
         flags.kink
     }
@@ -202,7 +212,7 @@ mod tests {
     }
 
     /// Returns a value with the slope 1 or, where the condition holds, with another one.
-    fn bent(x: &[Ray], condition: bool, slope: f64) -> Vec<Ray> {
+    fn bent(x: &[Ray], condition: Outcomes, slope: f64) -> Vec<Ray> {
         let slope = Ray::select(condition, Ray::from_f64(slope), Ray::from_f64(1.0));
         vec![slope * x[0], slope]
     }

@@ -29,8 +29,13 @@ pub(super) fn with_length<R>(length: usize, evaluate: impl FnOnce() -> R) -> (R,
     (result, IS_SHORT.get())
 }
 
+/// Returns the number of terms that a series keeps.
+pub(super) fn length() -> usize {
+    LENGTH.get()
+}
+
 /// A sum this small against everything that it was computed from is rounding: its terms cancel.
-const CANCELLED: f64 = 1e-12;
+pub(super) const CANCELLED: f64 = 1e-12;
 /// Powers that differ by less are equal.
 const SAME: f64 = 1e-9;
 /// Terms further apart than this many whole powers are sorted.
@@ -88,6 +93,11 @@ pub(super) struct Term {
 impl Term {
     fn exact(order: Order, factor: Factor) -> Self {
         Self { order, factor, doubt: 1.0 }
+    }
+
+    /// Creates a factor times a power of ε.
+    pub(super) fn of_power(power: f64, by: f64, doubt: f64) -> Self {
+        Self { order: Order { power, logs: 0.0 }, factor: factor(by), doubt }
     }
 
     /// Returns whether the term is negative.
@@ -153,8 +163,31 @@ impl Series {
         Self::of(vec![term(0.0, x), term(1.0, factor(slope))], Order::NEVER)
     }
 
-    fn undefined() -> Self {
+    pub(super) fn undefined() -> Self {
         Self { terms: Vec::new(), unknown: Order::ALWAYS }
+    }
+
+    /// Creates a series of terms in order, of which those from a power of ε on are unknown.
+    pub(super) fn of_powers(terms: Vec<Term>, unknown: f64) -> Self {
+        Self { terms, unknown: Order { power: unknown, logs: 0.0 } }
+    }
+
+    /// Returns powers of ε, factors and doubts of all terms; `None` if there are powers of logarithms, or factors beyond
+    /// the range of doubles.
+    pub(super) fn powers(&self) -> Option<impl Iterator<Item = (f64, f64, f64)>> {
+        let is_plain = |term: &Term| term.order.logs == 0.0 && term.factor.to_scalar().is_normal();
+        let are_plain = self.unknown.logs == 0.0 && self.terms.iter().all(is_plain);
+        are_plain.then(|| self.terms.iter().map(|term| (term.order.power, term.factor.to_scalar(), term.doubt)))
+    }
+
+    /// Returns the power of the largest term that is or may be there.
+    pub(super) fn leading_power(&self) -> f64 {
+        self.leading().power
+    }
+
+    /// Returns the power of the first unknown term.
+    pub(super) fn unknown_power(&self) -> f64 {
+        self.unknown.power
     }
 
     /// Sorts terms, adds those of one order, and drops those that are zero or unknown.
