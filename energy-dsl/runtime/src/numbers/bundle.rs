@@ -1,18 +1,17 @@
-//! Series along several rays at once.
+//! Numbers along several rays at once.
 //!
-//! Rays through one point mostly have series with the same powers of ε. Such series are rows of coefficients with a lane
-//! for each ray. Those with other powers, or with logarithms, stay apart.
+//! Rays through one point mostly have series with the same powers of ε and ln(1/ε). Such series are sums of rows of
+//! coefficients with a lane for each ray. Others stay apart.
 
 use std::borrow::Cow;
 use std::cell::Cell;
+use std::cmp::Ordering;
 
-use super::cpu::dispatch;
-use super::level::{Baseline, Kernel, Level};
-use super::real::{Mask, Number};
-use super::series::{CANCELLED, LENGTHS, Series, Term, length};
-
-/// The most rays of a bundle.
-pub(super) const LANES: usize = 8;
+use super::outcomes::{LANES, Outcomes};
+use super::real::Mask;
+use super::rows::{Coefficients, Row, Rows};
+use super::series::{LENGTHS, Order, Series, Term, length};
+use super::unbounded::Unbounded;
 
 thread_local! {
     /// Rays of the bundles that this thread is computing.
@@ -24,448 +23,200 @@ pub(super) fn set_rays(rays: usize) {
     RAYS.set(rays);
 }
 
-/// Outcomes of a comparison along the rays of a bundle.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Outcomes(u8);
+/// Numbers with more parts than this stay apart.
+const MOST_PARTS: usize = 6;
 
-impl Outcomes {
-    pub(super) fn of(outcome: impl Fn(usize) -> bool) -> Self {
-        Self((0..LANES).fold(0, |bits, ray| bits | u8::from(outcome(ray)) << ray))
-    }
-}
-
-impl std::ops::BitAnd for Outcomes {
-    type Output = Self;
-    fn bitand(self, other: Self) -> Self {
-        Self(self.0 & other.0)
-    }
-}
-
-impl std::ops::BitOr for Outcomes {
-    type Output = Self;
-    fn bitor(self, other: Self) -> Self {
-        Self(self.0 | other.0)
-    }
-}
-
-impl std::ops::Not for Outcomes {
-    type Output = Self;
-    fn not(self) -> Self {
-        Self(!self.0)
-    }
-}
-
-impl Mask for Outcomes {
-    fn none() -> Self {
-        Self(0)
-    }
-    fn bits(self) -> u32 {
-        self.0.into()
-    }
-    fn from_bits(bits: u32) -> Self {
-        Self((bits & u32::from(u8::MAX)) as u8)
-    }
-}
-
-type Row = [f64; LANES];
-
-/// The coefficients of one power of ε along all rays.
-#[derive(Clone, Copy, Debug)]
-struct Coefficients {
-    factors: Row,
-    /// Sizes of the largest numbers that were added or subtracted on the way: the error is this many roundoffs.
-    sizes: Row,
-}
-
-/// Numbers of other sizes are left to series, whose exponents are larger.
-const SIZES: std::ops::Range<f64> = 1e-120..1e120;
-
-impl Coefficients {
-    const ZERO: Self = Self { factors: [0.0; LANES], sizes: [0.0; LANES] };
-
-    /// Adds `times` · x · y.
-    #[inline(always)]
-    fn add_product(&mut self, times: f64, x: &Self, y: &Self) {
-        for ray in 0..LANES {
-            let (a, b) = (times * x.factors[ray], y.factors[ray]);
-            self.factors[ray] += a * b;
-            let size = larger(a.abs() * y.sizes[ray], times.abs() * x.sizes[ray] * b.abs());
-            self.sizes[ray] = larger(self.sizes[ray], size);
-        }
-    }
-
-    /// Divides by other coefficients. Where they are 0, the result is 0.
-    #[inline(always)]
-    fn divide(&mut self, by: &Self) {
-        for ray in 0..LANES {
-            let (factor, size, divisor) = (self.factors[ray], self.sizes[ray], by.factors[ray]);
-            let inverse = if divisor == 0.0 { 0.0 } else { 1.0 / divisor.abs() };
-            self.factors[ray] = if divisor == 0.0 { 0.0 } else { factor / divisor };
-            self.sizes[ray] = larger(size, factor.abs() * inverse * by.sizes[ray]) * inverse;
-        }
-    }
-
-    /// Multiplies by other coefficients.
-    #[inline(always)]
-    fn scale(&mut self, by: &Self) {
-        for ray in 0..LANES {
-            let (factor, size) = (self.factors[ray], self.sizes[ray]);
-            self.factors[ray] = factor * by.factors[ray];
-            self.sizes[ray] = larger(size * by.factors[ray].abs(), factor.abs() * by.sizes[ray]);
-        }
-    }
-
-    /// Replaces sums that are rounding errors by 0.
-    #[inline(always)]
-    fn drop_cancelled(&mut self) {
-        for ray in 0..LANES {
-            let is_known = self.sizes[ray] * CANCELLED < self.factors[ray].abs();
-            self.factors[ray] = if is_known { self.factors[ray] } else { 0.0 };
-            self.sizes[ray] = if is_known { self.sizes[ray] } else { 0.0 };
-        }
-    }
-
-    /// Returns whether all numbers are 0 or of moderate size.
-    #[inline(always)]
-    fn are_moderate(&self) -> bool {
-        let is_moderate = |&x: &f64| x == 0.0 || SIZES.start < x.abs() && x.abs() < SIZES.end;
-        self.factors.iter().fold(true, |all, x| all & is_moderate(x)) & self.sizes.iter().all(|size| *size < 1e200)
-    }
-
-    fn is_zero(&self) -> bool {
-        self.factors == [0.0; LANES]
-    }
-}
-
-#[inline(always)]
-fn larger(a: f64, b: f64) -> f64 {
-    if a < b { b } else { a }
-}
-
-/// Series along all rays whose powers of ε ascend in steps of 1 from the same one.
+/// A sum of rows whose powers do not overlap.
 #[derive(Clone, Debug)]
-pub(super) struct Rows {
-    power: f64,
-    list: Vec<Coefficients>,
-    /// Whether the terms after the last row are 0. Otherwise they are unknown.
-    is_exact: bool,
+pub(super) struct Sum {
+    part: Rows,
+    others: Vec<Rows>,
     /// Rays along which the number is undefined. Their coefficients are 0.
     undefined: Outcomes,
 }
 
-/// Computes rows.
-enum Operation<'a> {
-    Product(&'a [Coefficients], &'a [Coefficients]),
-    Quotient(&'a [Coefficients], &'a [Coefficients]),
-    /// A power of a series that begins with 1.
-    Power(&'a [Coefficients], f64),
-}
+impl Sum {
+    fn of(part: Rows, undefined: Outcomes) -> Self {
+        Self { part: part.cleared(undefined), others: Vec::new(), undefined }
+    }
 
-struct Compute<'a> {
-    operation: Operation<'a>,
-    rows: &'a mut [Coefficients],
-}
+    fn parts(&self) -> impl Iterator<Item = &Rows> {
+        std::iter::once(&self.part).chain(&self.others)
+    }
 
-impl Kernel for Compute<'_> {
-    type Output = bool;
+    /// Returns the only part.
+    fn single(&self) -> Option<&Rows> {
+        self.others.is_empty().then_some(&self.part)
+    }
 
-    #[inline(always)]
-    fn run<L: Level>(self) -> bool {
-        for k in 0..self.rows.len() {
-            let (before, after) = self.rows.split_at_mut(k);
-            let row = &mut after[0];
-            match self.operation {
-                Operation::Product(a, b) => {
-                    for i in (k + 1).saturating_sub(b.len())..a.len().min(k + 1) {
-                        row.add_product(1.0, &a[i], &b[k - i]);
-                    }
-                    row.drop_cancelled();
-                }
-                Operation::Quotient(a, b) => {
-                    *row = a.get(k).copied().unwrap_or(Coefficients::ZERO);
-                    for i in 1..b.len().min(k + 1) {
-                        row.add_product(-1.0, &b[i], &before[k - i]);
-                    }
-                    row.drop_cancelled();
-                    row.divide(&b[0]);
-                }
-                Operation::Power(series, exponent) => {
-                    if k == 0 {
-                        *row = series[0];
-                    }
-                    for i in 1..series.len().min(k + 1) {
-                        let times = (exponent * i as f64 - (k - i) as f64) / k as f64;
-                        row.add_product(times, &series[i], &before[k - i]);
-                    }
-                    row.drop_cancelled();
-                }
-            }
+    /// Adds sign · part.
+    fn add(&mut self, part: &Rows, sign: f64) -> Option<()> {
+        let negative = if sign < 0.0 { !Outcomes::none() } else { Outcomes::none() };
+        if part.is_zero() {
+            return Some(());
         }
-        self.rows.iter().fold(true, |all, row| all & row.are_moderate())
+        if self.part.is_zero() {
+            self.part = part.signed(negative).cleared(self.undefined);
+            return Some(());
+        }
+        let parts = self.others.len() + 1;
+        let own = std::iter::once(&mut self.part).chain(&mut self.others).find(|own| own.overlaps(part));
+        match own {
+            Some(own) => *own = own.plus(part, sign)?.cleared(self.undefined),
+            None if parts < MOST_PARTS => self.others.push(part.signed(negative).cleared(self.undefined)),
+            None => return None,
+        }
+        if !self.others.is_empty() {
+            self.drop_unknown();
+        }
+        Some(())
     }
-}
 
-impl Rows {
-    /// Creates x + slope · ε along each ray; `None` if a number is too large or too small.
-    fn linear(x: f64, slopes: &Row) -> Option<Self> {
-        let of = |factors: Row| Coefficients { factors, sizes: factors.map(f64::abs) };
-        let rays = RAYS.get();
-        let undefined = Outcomes::of(|ray| ray >= rays);
-        let value = std::array::from_fn(|ray| if ray < rays { x } else { 0.0 });
-        Self { power: 0.0, list: vec![of(value), of(*slopes)], is_exact: true, undefined }.checked()
+    /// Drops parts that are 0, or smaller than the first unknown term.
+    fn drop_unknown(&mut self) {
+        let end = self.end();
+        let is_known = |part: &Rows| !part.is_zero() && !end.is_larger_than(part.end()) || part.exceeds(end);
+        self.others.retain(is_known);
+        if !is_known(&self.part)
+            && let Some(other) = self.others.pop()
+        {
+            self.part = other;
+        }
     }
 
-    fn checked(self) -> Option<Self> {
-        self.list.iter().all(Coefficients::are_moderate).then(|| self.stripped())
+    /// Adds parts.
+    fn total(parts: impl Iterator<Item = Option<Rows>>, undefined: Outcomes) -> Option<Self> {
+        let mut sum = Self::of(Rows::zero(), undefined);
+        for part in parts {
+            sum.add(&part?, 1.0)?;
+        }
+        Some(sum)
     }
 
-    /// Drops leading rows that are 0.
-    fn stripped(mut self) -> Self {
-        let zeros = self.list.iter().take_while(|row| row.is_zero()).count();
-        if zeros > 0 {
-            self.list.drain(..zeros);
-            self.power += zeros as f64;
+    fn plus(&self, other: &Self, sign: f64) -> Option<Self> {
+        let mut sum = self.clone().undefined_along(other.undefined);
+        other.parts().try_for_each(|part| sum.add(part, sign))?;
+        Some(sum)
+    }
+
+    fn undefined_along(mut self, rays: Outcomes) -> Self {
+        if self.undefined | rays != self.undefined {
+            self.undefined = self.undefined | rays;
+            self.part = self.part.cleared(rays);
+            self.others = self.others.into_iter().map(|part| part.cleared(rays)).collect();
         }
         self
     }
 
-    /// Returns the number of known rows.
-    fn known(&self) -> usize {
-        if self.is_exact { usize::MAX } else { self.list.len() }
-    }
-
-    fn is_zero_along(&self, ray: usize) -> bool {
-        self.list.iter().all(|row| row.factors[ray] == 0.0)
-    }
-
-    fn computed(&self, power: f64, rows: usize, is_exact: bool, operation: Operation<'_>) -> Option<Self> {
-        let mut list = vec![Coefficients::ZERO; rows];
-        let are_moderate = dispatch(Compute { operation, rows: &mut list });
-        are_moderate.then(|| Self { power, list, is_exact, ..*self }.stripped())
-    }
-
-    fn with_undefined(self, undefined: Outcomes) -> Self {
-        let mut rows = Self { undefined: self.undefined | undefined, ..self };
-        if rows.undefined != self.undefined {
-            for ray in (0..LANES).filter(|&ray| rows.undefined.lane(ray)) {
-                for row in &mut rows.list {
-                    (row.factors[ray], row.sizes[ray]) = (0.0, 0.0);
-                }
-            }
-        }
-        rows
-    }
-
-    fn is_zero(&self) -> bool {
-        self.is_exact && self.list.is_empty()
-    }
-
     fn times(&self, other: &Self) -> Option<Self> {
-        if self.is_zero() || other.is_zero() {
-            let zero = if self.is_zero() { self } else { other };
-            return Some(zero.clone().with_undefined(self.undefined | other.undefined));
+        let undefined = self.undefined | other.undefined;
+        if let (Some(a), Some(b)) = (self.single(), other.single()) {
+            return Some(Self::of(a.times(b)?, undefined));
         }
-        let most = (self.list.len() + other.list.len()).saturating_sub(1);
-        let rows = most.min(length()).min(self.known()).min(other.known());
-        let is_exact = self.is_exact && other.is_exact && rows == most;
-        let product = Operation::Product(&self.list, &other.list);
-        Some(self.computed(self.power + other.power, rows, is_exact, product)?.with_undefined(other.undefined))
-    }
-
-    /// Returns the rays along which the first coefficient is 0 but not the series, or the series is not known to be 0.
-    fn has_other_leading_terms(&self) -> bool {
-        let is_other = |ray: usize| {
-            let is_zero = self.list.first().is_none_or(|row| row.factors[ray] == 0.0);
-            is_zero && !self.undefined.lane(ray) && !(self.is_exact && self.is_zero_along(ray))
-        };
-        (0..LANES).any(is_other)
+        Self::total(self.parts().flat_map(|a| other.parts().map(move |b| a.times(b))), undefined)
     }
 
     fn over(&self, other: &Self) -> Option<Self> {
-        if other.has_other_leading_terms() {
-            return None;
-        }
-        let undefined = Outcomes::of(|ray| other.is_zero_along(ray)) | other.undefined;
-        if other.list.is_empty() {
-            return Some(Self { list: Vec::new(), ..self.clone() }.with_undefined(!Outcomes::none()));
-        }
-        let is_exact = self.is_exact && other.is_exact && other.list.len() == 1;
-        let most = if is_exact { self.list.len() } else { usize::MAX };
-        let rows = most.min(length()).min(self.known()).min(other.known());
-        let quotient = Operation::Quotient(&self.list, &other.list);
-        Some(self.computed(self.power - other.power, rows, is_exact, quotient)?.with_undefined(undefined))
+        let divisor = other.single()?;
+        let mut undefined = self.undefined | other.undefined;
+        let quotients: Option<Vec<_>> = self.parts().map(|part| part.over(divisor, undefined)).collect();
+        let quotients = quotients?;
+        undefined = quotients.iter().fold(undefined, |all, (_, zero)| all | *zero);
+        Self::total(quotients.into_iter().map(|(quotient, _)| Some(quotient)), undefined)
     }
 
-    /// Returns a power with a constant exponent other than 0.
     fn raised(&self, exponent: f64) -> Option<Self> {
-        let first = *self.list.first()?;
-        let is_zero = |ray: usize| first.factors[ray] == 0.0 && !self.undefined.lane(ray);
-        if (0..LANES).any(is_zero) {
-            return None;
-        }
-        let negative = Outcomes::of(|ray| first.factors[ray] < 0.0 && exponent.fract() != 0.0);
-        let is_exact = self.is_exact && self.list.len() == 1;
-        let rows = if is_exact { 1 } else { length().min(self.known()) };
-        let mut series = self.list.clone();
-        series.iter_mut().for_each(|row| row.divide(&first));
-        let mut raised = self.computed(self.power * exponent, rows, is_exact, Operation::Power(&series, exponent))?;
-        let factors: Row = first.factors.map(|x| power(x, exponent));
-        let doubts: Row = std::array::from_fn(|ray| first.sizes[ray] / first.factors[ray].abs());
-        let sizes = std::array::from_fn(|ray| if factors[ray] == 0.0 { 0.0 } else { factors[ray].abs() * doubts[ray] });
-        raised.list.iter_mut().for_each(|row| row.scale(&Coefficients { factors, sizes }));
-        raised.with_undefined(negative).checked()
+        let (raised, negative) = self.single()?.raised(exponent, self.undefined)?;
+        Some(Self::of(raised, self.undefined | negative))
     }
 
-    /// Combines the rows of two numbers, each a function of the rows with the same power; 0 stands for those that are
-    /// missing. `None` if their powers do not differ by whole steps.
-    fn combined(
-        &self,
-        other: &Self,
-        combine: impl Fn(&Coefficients, &Coefficients) -> Coefficients,
-        undefined: Outcomes,
-    ) -> Option<Self> {
-        let difference = if self.is_zero() || other.is_zero() { 0.0 } else { other.power - self.power };
-        if difference != difference.round() || difference.abs() > MOST_STEPS {
-            return None;
-        }
-        let (mine, others) = ((-difference).max(0.0) as usize, difference.max(0.0) as usize);
-        let most = (mine + self.list.len()).max(others + other.list.len());
-        let known = self.known().saturating_add(mine).min(other.known().saturating_add(others));
-        let rows = most.min(length()).min(known);
-        let row = |of: &Self, k: usize, from: usize| match k.checked_sub(from) {
-            Some(k) => of.list.get(k).copied().unwrap_or(Coefficients::ZERO),
-            None => Coefficients::ZERO,
-        };
-        let list = (0..rows).map(|k| combine(&row(self, k, mine), &row(other, k, others))).collect();
-        let is_exact = self.is_exact && other.is_exact && rows == most;
-        let power = match (self.is_zero(), other.is_zero()) {
-            (true, _) => other.power,
-            (_, true) => self.power,
-            _ => self.power.min(other.power),
-        };
-        Self { power, list, is_exact, undefined: Outcomes::none() }.with_undefined(undefined).checked()
+    fn ln(&self) -> Option<Self> {
+        let (parts, negative) = self.single()?.ln(self.undefined)?;
+        Self::total(parts.into_iter().map(Some), self.undefined | negative)
     }
 
-    /// Returns self + sign · other.
-    fn plus(&self, other: &Self, sign: f64) -> Option<Self> {
-        let sum = |a: &Coefficients, b: &Coefficients| {
-            let mut sum = *a;
-            for ray in 0..LANES {
-                sum.factors[ray] += sign * b.factors[ray];
-                sum.sizes[ray] = larger(sum.sizes[ray], b.sizes[ray]);
-            }
-            sum.drop_cancelled();
-            sum
-        };
-        self.combined(other, sum, self.undefined | other.undefined)
+    fn exp(&self) -> Option<Self> {
+        Some(Self::of(self.single()?.exp()?, self.undefined))
     }
 
-    /// Returns each ray's choice.
-    fn select(outcomes: Outcomes, yes: &Self, no: &Self) -> Option<Self> {
-        let choose = |a: &Coefficients, b: &Coefficients| {
-            let mut chosen = *a;
-            for ray in (0..LANES).filter(|&ray| !outcomes.lane(ray)) {
-                (chosen.factors[ray], chosen.sizes[ray]) = (b.factors[ray], b.sizes[ray]);
-            }
-            chosen
-        };
-        yes.combined(no, choose, yes.undefined & outcomes | no.undefined & !outcomes)
+    fn angle(&self, x: &Self) -> Option<Self> {
+        let undefined = self.undefined | x.undefined;
+        let parts = self.single()?.angle(x.single()?, undefined)?;
+        Self::total(parts.into_iter().map(Some), undefined)
     }
 
     fn signed(&self, negative: Outcomes) -> Self {
-        let mut rows = self.clone();
-        for row in &mut rows.list {
-            for ray in (0..LANES).filter(|&ray| negative.lane(ray)) {
-                row.factors[ray] = -row.factors[ray];
-            }
-        }
-        rows
+        let others = self.others.iter().map(|part| part.signed(negative)).collect();
+        Self { part: self.part.signed(negative), others, ..*self }
+    }
+
+    fn select(outcomes: Outcomes, yes: &Self, no: &Self) -> Option<Self> {
+        let undefined = yes.undefined & outcomes | no.undefined & !outcomes;
+        let parts = yes.parts().map(|part| part.clone().cleared(!outcomes));
+        Self::total(parts.chain(no.parts().map(|part| part.clone().cleared(outcomes))).map(Some), undefined)
+    }
+
+    /// Returns the order of the first unknown term.
+    fn end(&self) -> Order {
+        self.parts().map(Rows::end).fold(Order::NEVER, Order::larger)
+    }
+
+    /// Returns the largest known term along a ray.
+    fn first(&self, ray: usize) -> Option<Term> {
+        let first = self.parts().filter_map(|part| part.terms(ray).next());
+        let largest = first.reduce(|a, b| if b.order().is_larger_than(a.order()) { b } else { a })?;
+        largest.order().is_larger_than(self.end()).then_some(largest)
     }
 
     fn along(&self, ray: usize) -> Series {
         if self.undefined.lane(ray) {
             return Series::undefined();
         }
-        let term = |(k, row): (usize, &Coefficients)| {
-            let factor = row.factors[ray];
-            (factor != 0.0).then(|| Term::of_power(self.power + k as f64, factor, row.sizes[ray] / factor.abs()))
-        };
-        let terms = self.list.iter().enumerate().filter_map(term).collect();
-        let unknown = if self.is_exact { f64::INFINITY } else { self.power + self.list.len() as f64 };
-        Series::of_powers(terms, unknown)
+        let terms = self.parts().flat_map(|part| part.terms(ray)).collect();
+        Series::of(terms, self.end())
     }
 
-    /// Returns the first known term along a ray; `None` if there is none.
-    fn first(&self, ray: usize) -> Option<Term> {
-        let (k, row) = self.list.iter().enumerate().find(|(_, row)| row.factors[ray] != 0.0)?;
-        let factor = row.factors[ray];
-        Some(Term::of_power(self.power + k as f64, factor, row.sizes[ray] / factor.abs()))
-    }
-
-    /// Creates the rows of some series; `None` if they have logarithms or other powers. Terms after the last row are
-    /// not kept.
-    fn of(series: &[Series]) -> Option<Self> {
-        let defined = || series.iter().enumerate().filter(|(_, series)| series.is_defined());
-        let undefined = Outcomes::of(|ray| series.get(ray).is_none_or(|series| !series.is_defined()));
-        Self::from_lanes(defined(), undefined, |row, ray, factor, size| {
-            (row.factors[ray], row.sizes[ray]) = (factor, size);
-        })
-    }
-
-    /// Creates the rows of a series that is the same along all rays.
-    fn same(series: &Series) -> Option<Self> {
-        let rays = RAYS.get();
-        let undefined = Outcomes::of(|ray| ray >= rays || !series.is_defined());
-        let defined = series.is_defined().then_some((0, series)).into_iter();
-        Self::from_lanes(defined, undefined, |row, _, factor, size| {
-            row.factors[..rays].fill(factor);
-            row.sizes[..rays].fill(size);
-        })
-    }
-
-    fn from_lanes<'a>(
-        series: impl Iterator<Item = (usize, &'a Series)> + Clone,
-        undefined: Outcomes,
-        set: impl Fn(&mut Coefficients, usize, f64, f64),
-    ) -> Option<Self> {
-        let least = |powers: &mut dyn Iterator<Item = f64>| powers.fold(f64::INFINITY, f64::min);
-        let power = least(&mut series.clone().map(|(_, series)| series.leading_power()));
-        let end = least(&mut series.clone().map(|(_, series)| series.unknown_power()));
-        if power == f64::INFINITY {
-            return Some(Self { power: 0.0, list: Vec::new(), is_exact: true, undefined });
-        }
-        let mut list = vec![Coefficients::ZERO; (end - power).floor().clamp(0.0, length() as f64) as usize];
-        let (mut rows, mut is_exact) = (0, end == f64::INFINITY);
-        for (ray, series) in series {
-            for (order, factor, doubt) in series.powers()? {
-                let step = order - power;
-                if step != step.round() {
-                    return None;
-                }
-                match list.get_mut(step as usize) {
-                    Some(row) => set(row, ray, factor, factor.abs() * doubt),
-                    None => is_exact = false,
-                }
-                rows = rows.max(step as usize + 1);
+    /// Creates the sum of some series, each along some rays; `None` if a number is too large or too small. Terms after
+    /// the last row are not kept.
+    fn from_series(series: &[(Series, Outcomes)], undefined: Outcomes) -> Option<Self> {
+        let end = series.iter().fold(Order::NEVER, |end, (series, _)| end.larger(series.unknown()));
+        let mut firsts: Vec<Order> = Vec::new();
+        for term in series.iter().flat_map(|(series, _)| series.terms()) {
+            match firsts.iter_mut().find(|first| term.order().is_in_steps_from(**first)) {
+                Some(first) => *first = first.larger(term.order()),
+                None => firsts.push(term.order()),
             }
         }
-        if is_exact {
-            list.truncate(rows);
+        if firsts.len() > MOST_PARTS {
+            return None;
         }
-        Self { power, list, is_exact, undefined }.checked()
+        if firsts.is_empty() {
+            let is_exact = end.compare(Order::NEVER) == Ordering::Equal;
+            return Some(Self::of(if is_exact { Rows::zero() } else { Rows::new(end, &[], false)? }, undefined));
+        }
+        Self::total(firsts.into_iter().map(|first| rows_of(series, first, end)), undefined)
     }
 }
 
-/// Powers further apart than this many steps are kept as series.
-const MOST_STEPS: f64 = 64.0;
-
-fn power(x: f64, exponent: f64) -> f64 {
-    let size = if exponent == 0.5 { x.abs().sqrt() } else { Number::powf::<Baseline>(x.abs(), exponent) };
-    match x {
-        0.0 => 0.0,
-        x if x < 0.0 && exponent % 2.0 != 0.0 => -size,
-        _ => size,
+/// Returns the rows of terms in whole steps from one order.
+fn rows_of(series: &[(Series, Outcomes)], first: Order, end: Order) -> Option<Rows> {
+    let known = (0..length()).take_while(|&step| first.after(step).is_larger_than(end)).count();
+    let (mut rows, mut used) = ([Coefficients::ZERO; LENGTHS[0]], 0);
+    let list = &mut rows[..known];
+    let mut is_exact = end.compare(Order::NEVER) == Ordering::Equal;
+    for (series, rays) in series {
+        for term in series.terms().iter().filter(|term| term.order().is_in_steps_from(first)) {
+            let step = (term.order().power - first.power).round() as usize;
+            let Some(row) = list.get_mut(step) else {
+                is_exact = false;
+                continue;
+            };
+            let (factor, size) = term.plain()?;
+            (0..LANES).filter(|&ray| rays.lane(ray)).for_each(|ray| row.set(ray, factor, size));
+            used = used.max(step + 1);
+        }
     }
+    Rows::new(first, &list[..if is_exact { used } else { known }], is_exact)
 }
 
 /// A number along the rays of a bundle.
@@ -473,20 +224,29 @@ fn power(x: f64, exponent: f64) -> f64 {
 pub(super) enum Bundle {
     /// It does not depend on the ray.
     Same(Series),
-    Rows(Rows),
+    Sum(Sum),
     Apart(Vec<Series>),
+}
+
+/// Returns whether long series are asked for. They are kept apart, to lose no term.
+fn is_long() -> bool {
+    length() > LENGTHS[0]
 }
 
 impl Bundle {
     /// Creates x + slope · ε along each ray.
-    pub(super) fn linear(x: super::unbounded::Unbounded<f64>, slopes: &[f64]) -> Self {
+    pub(super) fn linear(x: Unbounded<f64>, slopes: &[f64]) -> Self {
         if slopes.iter().all(|&slope| slope == 0.0) && x.is_finite() {
             return Self::Same(Series::linear(x, 0.0));
         }
-        let mut row = [0.0; LANES];
-        row[..slopes.len()].copy_from_slice(slopes);
-        let rows = (x.is_finite() && !is_long()).then(|| Rows::linear(x.to_scalar(), &row)).flatten();
-        rows.map_or_else(|| Self::Apart(slopes.iter().map(|&slope| Series::linear(x, slope)).collect()), Self::Rows)
+        let row = |value: &dyn Fn(usize) -> f64| -> Row {
+            std::array::from_fn(|ray| if ray < slopes.len() { value(ray) } else { 0.0 })
+        };
+        let rows = || Rows::linear(row(&|_| x.to_scalar()), row(&|ray| slopes[ray]));
+        match (x.is_finite() && !is_long()).then(rows).flatten() {
+            Some(rows) => Self::Sum(Sum::of(rows, !Outcomes::first(slopes.len()))),
+            None => Self::Apart(slopes.iter().map(|&slope| Series::linear(x, slope)).collect()),
+        }
     }
 
     pub(super) fn number(value: f64) -> Self {
@@ -497,14 +257,32 @@ impl Bundle {
         if is_long() {
             return Self::Apart(series);
         }
-        Rows::of(&series).map_or(Self::Apart(series), Self::Rows)
+        let undefined = Outcomes::of(|ray| series.get(ray).is_none_or(|series| !series.is_defined()));
+        let along = |(ray, series)| (series, Outcomes::of(|other| other == ray));
+        let defined: Vec<_> = series.iter().cloned().enumerate().map(along).filter(|(s, _)| s.is_defined()).collect();
+        Sum::from_series(&defined, undefined).map_or(Self::Apart(series), Self::Sum)
     }
 
-    /// Returns the number as rows, unless long series are asked for.
-    fn rows(&self) -> Option<Cow<'_, Rows>> {
+    /// Returns the number as a sum of rows, unless long series are asked for.
+    fn sum(&self) -> Option<Cow<'_, Sum>> {
         match self {
-            Self::Rows(rows) => Some(Cow::Borrowed(rows)),
-            Self::Same(series) if !is_long() => Rows::same(series).map(Cow::Owned),
+            Self::Sum(sum) => Some(Cow::Borrowed(sum)),
+            Self::Same(series) if !is_long() && series.is_defined() => {
+                let all = Outcomes::first(RAYS.get());
+                if let [term] = series.terms()
+                    && term.order().is_in_steps_from(Order::ONE)
+                    && term.order().power == 0.0
+                    && series.is_exact()
+                {
+                    let (factor, size) = term.plain()?;
+                    return Some(Cow::Owned(Sum {
+                        part: Rows::same(factor, size, all)?,
+                        others: Vec::new(),
+                        undefined: !all,
+                    }));
+                }
+                Sum::from_series(&[(series.clone(), all)], !all).map(Cow::Owned)
+            }
             _ => None,
         }
     }
@@ -512,38 +290,39 @@ impl Bundle {
     pub(super) fn along(&self, ray: usize) -> Cow<'_, Series> {
         match self {
             Self::Same(series) => Cow::Borrowed(series),
-            Self::Rows(rows) => Cow::Owned(rows.along(ray)),
+            Self::Sum(sum) => Cow::Owned(sum.along(ray)),
             Self::Apart(series) => Cow::Borrowed(&series[ray]),
         }
     }
 
-    fn map(&self, rows: impl Fn(&Rows) -> Option<Rows>, apart: impl Fn(&Series) -> Series) -> Self {
+    fn map(&self, of_sum: impl Fn(&Sum) -> Option<Sum>, of_series: impl Fn(&Series) -> Series) -> Self {
         match self {
-            Self::Same(series) => Self::Same(apart(series)),
-            Self::Rows(own) => rows(own).map_or_else(|| self.map_apart(apart), Self::Rows),
-            Self::Apart(_) => self.map_apart(apart),
+            Self::Same(series) => return Self::Same(of_series(series)),
+            Self::Sum(sum) => {
+                if let Some(found) = of_sum(sum) {
+                    return Self::Sum(found);
+                }
+            }
+            Self::Apart(_) => {}
         }
-    }
-
-    fn map_apart(&self, apart: impl Fn(&Series) -> Series) -> Self {
-        Self::of((0..RAYS.get()).map(|ray| apart(&self.along(ray))).collect())
+        Self::of((0..RAYS.get()).map(|ray| of_series(&self.along(ray))).collect())
     }
 
     fn map_two(
         &self,
         other: &Self,
-        rows: impl Fn(&Rows, &Rows) -> Option<Rows>,
-        apart: impl Fn(&Series, &Series) -> Series,
+        of_sums: impl Fn(&Sum, &Sum) -> Option<Sum>,
+        of_series: impl Fn(&Series, &Series) -> Series,
     ) -> Self {
         if let (Self::Same(a), Self::Same(b)) = (self, other) {
-            return Self::Same(apart(a, b));
+            return Self::Same(of_series(a, b));
         }
-        if let (Some(a), Some(b)) = (self.rows(), other.rows())
-            && let Some(found) = rows(&a, &b)
+        if let (Some(a), Some(b)) = (self.sum(), other.sum())
+            && let Some(found) = of_sums(&a, &b)
         {
-            return Self::Rows(found);
+            return Self::Sum(found);
         }
-        Self::of((0..RAYS.get()).map(|ray| apart(&self.along(ray), &other.along(ray))).collect())
+        Self::of((0..RAYS.get()).map(|ray| of_series(&self.along(ray), &other.along(ray))).collect())
     }
 
     pub(super) fn plus(&self, other: &Self) -> Self {
@@ -555,43 +334,75 @@ impl Bundle {
     }
 
     pub(super) fn times(&self, other: &Self) -> Self {
-        self.map_two(other, Rows::times, Series::times)
+        self.map_two(other, Sum::times, Series::times)
     }
 
     pub(super) fn over(&self, other: &Self) -> Self {
-        self.map_two(other, Rows::over, |a, b| a.times(&b.reciprocal()))
+        self.map_two(other, Sum::over, |a, b| a.times(&b.reciprocal()))
     }
 
     pub(super) fn raised(&self, exponent: f64) -> Self {
-        self.map(|rows| rows.raised(exponent), |series| series.raised(exponent))
+        let of_sum = |sum: &Sum| if exponent == 0.0 { None } else { sum.raised(exponent) };
+        self.map(of_sum, |series| series.raised(exponent))
+    }
+
+    pub(super) fn power(&self, exponent: &Self) -> Self {
+        if let Self::Same(series) = exponent
+            && let Some((constant, rest)) = series.finite()
+            && rest.is_zero()
+        {
+            return self.raised(constant);
+        }
+        let of_series = |base: &Series, exponent: &Series| match exponent.finite() {
+            Some((constant, rest)) if rest.is_zero() => base.raised(constant),
+            _ => base.ln().times(exponent).exp(),
+        };
+        self.map_two(exponent, |_, _| None, of_series)
+    }
+
+    pub(super) fn exp(&self) -> Self {
+        self.map(Sum::exp, Series::exp)
+    }
+
+    pub(super) fn ln(&self) -> Self {
+        self.map(Sum::ln, Series::ln)
+    }
+
+    pub(super) fn sin(&self) -> Self {
+        self.map(|_| None, |series| series.sin_cos().0)
+    }
+
+    pub(super) fn cos(&self) -> Self {
+        self.map(|_| None, |series| series.sin_cos().1)
+    }
+
+    /// Returns the angle of the points (x, self).
+    pub(super) fn angle(&self, x: &Self) -> Self {
+        self.map_two(x, Sum::angle, Series::angle)
     }
 
     /// Changes the sign along some rays.
     pub(super) fn signed(&self, negative: Outcomes) -> Self {
+        let sign = |ray: usize| if negative.lane(ray) { -1.0 } else { 1.0 };
         match self {
             _ if !negative.any() => self.clone(),
-            Self::Rows(rows) => Self::Rows(rows.signed(negative)),
+            Self::Sum(sum) => Self::Sum(sum.signed(negative)),
             Self::Same(series) if negative.all() => Self::Same(series.scaled(-1.0)),
-            _ => {
-                let sign = |ray: usize| if negative.lane(ray) { -1.0 } else { 1.0 };
-                Self::of((0..RAYS.get()).map(|ray| self.along(ray).scaled(sign(ray))).collect())
-            }
+            _ => Self::of((0..RAYS.get()).map(|ray| self.along(ray).scaled(sign(ray))).collect()),
         }
     }
 
     pub(super) fn select(outcomes: Outcomes, yes: &Self, no: &Self) -> Self {
         let rays = RAYS.get();
-        let taken = (0..rays).filter(|&ray| outcomes.lane(ray)).count();
-        if taken == rays {
-            return yes.clone();
+        match (0..rays).filter(|&ray| outcomes.lane(ray)).count() {
+            0 => return no.clone(),
+            taken if taken == rays => return yes.clone(),
+            _ => {}
         }
-        if taken == 0 {
-            return no.clone();
-        }
-        if let (Some(a), Some(b)) = (yes.rows(), no.rows())
-            && let Some(found) = Rows::select(outcomes, &a, &b)
+        if let (Some(yes), Some(no)) = (yes.sum(), no.sum())
+            && let Some(found) = Sum::select(outcomes, &yes, &no)
         {
-            return Self::Rows(found);
+            return Self::Sum(found);
         }
         let along = |ray: usize| if outcomes.lane(ray) { yes.along(ray) } else { no.along(ray) }.into_owned();
         Self::of((0..rays).map(along).collect())
@@ -600,8 +411,8 @@ impl Bundle {
     /// Returns whether the number is defined along a ray. There are none beyond the last.
     pub(super) fn is_defined(&self, ray: usize) -> bool {
         match self {
-            Self::Rows(rows) => !rows.undefined.lane(ray),
             Self::Same(series) => series.is_defined(),
+            Self::Sum(sum) => !sum.undefined.lane(ray),
             Self::Apart(series) => series.get(ray).is_some_and(Series::is_defined),
         }
     }
@@ -610,29 +421,8 @@ impl Bundle {
     pub(super) fn first(&self) -> [Option<Term>; LANES] {
         match self {
             Self::Same(series) => [series.first(); LANES],
-            Self::Rows(rows) => std::array::from_fn(|ray| rows.first(ray)),
+            Self::Sum(sum) => std::array::from_fn(|ray| sum.first(ray)),
             Self::Apart(series) => std::array::from_fn(|ray| series.get(ray)?.first()),
         }
     }
-
-    /// Returns the number if it is the same along all rays, and finite.
-    pub(super) fn constant(&self) -> Option<f64> {
-        let Self::Same(series) = self else { return None };
-        series.finite().filter(|(_, rest)| rest.is_zero()).map(|(constant, _)| constant)
-    }
-
-    /// Computes a function of series along each ray.
-    pub(super) fn apart(&self, function: impl Fn(&Series) -> Series) -> Self {
-        self.map(|_| None, function)
-    }
-
-    /// Computes a function of two series along each ray.
-    pub(super) fn apart_with(&self, other: &Self, function: impl Fn(&Series, &Series) -> Series) -> Self {
-        self.map_two(other, |_, _| None, function)
-    }
-}
-
-/// Returns whether long series are asked for. They are kept apart, to lose no term.
-fn is_long() -> bool {
-    length() > LENGTHS[0]
 }

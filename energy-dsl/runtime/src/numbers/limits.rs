@@ -38,9 +38,9 @@ pub struct Care<T: Number> {
     pub definite: T::Mask,
 }
 
-/// Rays that are tried first: four opposite pairs.
+/// Rays that are tried first: four opposite pairs. They usually tell a singularity, where each ray has its own results.
 const FEW: usize = 8;
-/// Rays that usually tell a singularity, where each ray has its own results: eight more directions.
+/// Rays that tell one where opposite rays agree: eight more directions.
 const SOME: usize = 16;
 /// The fewest of them that must have results, which other rays may not have: they leave the formula's domain.
 const ENOUGH: usize = 5;
@@ -241,23 +241,19 @@ impl<'a> Rays<'a> {
     /// Looks for rays into narrow regions where the formula takes another branch, with other results.
     fn cast_into_narrow_regions(&mut self) {
         let rays: Vec<Evaluated<'_>> = self.paths.iter().map(Path::evaluated).collect();
-        let found =
-            one_sided(&rays).into_iter().filter(|comparisons| self.matter(comparisons)).find_map(|comparisons| {
-                let (inputs, moves) = (&self.inputs[..], self.roles.moves);
-                let found = Search { inputs, moves, along: self.along, comparison: comparisons[0] }.run(&rays);
-                let differs = |ray: Found| !self.has_results(ray.limits);
-                Ray::evaluate(inputs, &found, self.along).into_iter().any(differs).then_some(found)
-            });
+        let (inputs, moves) = (&self.inputs[..], self.roles.moves);
+        let differ = |found: Vec<Found>| found.into_iter().map(|ray| !self.has_results(ray.limits)).collect::<Vec<_>>();
+        let comparisons = one_sided(&rays);
+        let matter = differ(Ray::evaluate_reversed(&comparisons, inputs, &self.paths[0].slopes, self.along));
+        let mut important = comparisons.iter().zip(matter).filter(|(_, matters)| *matters);
+        let found = important.find_map(|(comparisons, _)| {
+            let found = Search { inputs, moves, along: self.along, comparison: comparisons[0] }.run(&rays);
+            differ(Ray::evaluate(inputs, &found, self.along)).contains(&true).then_some(found)
+        });
         if let Some(found) = found {
             self.cast(MANY);
             self.cast_along(found);
         }
-    }
-
-    /// Returns whether results change if comparisons have the other outcome.
-    fn matter(&self, comparisons: &[usize]) -> bool {
-        let reversed = Ray::evaluate_reversed(comparisons, &self.inputs, &self.paths[0].slopes, self.along);
-        !self.has_results(reversed.limits)
     }
 
     /// Returns whether limits are those of the first ray, or do not exist because the formula is degenerate.
@@ -278,9 +274,11 @@ impl<'a> Rays<'a> {
         if self.agree() {
             self.cast_into_narrow_regions();
         } else {
-            self.cast(SOME);
-            if !self.are_scattered() {
-                self.cast(MANY);
+            for rays in [SOME, MANY] {
+                if self.are_scattered() {
+                    break;
+                }
+                self.cast(rays);
             }
         }
         let mut settled = Vec::with_capacity(plain.len());
@@ -446,8 +444,8 @@ pub(super) fn slope(ray: usize, input: usize) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::numbers::bundle::Outcomes;
     use crate::numbers::level::Baseline;
+    use crate::numbers::outcomes::Outcomes;
 
     type Formula = fn(&[Ray]) -> Vec<Ray>;
 

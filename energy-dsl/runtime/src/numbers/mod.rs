@@ -11,8 +11,10 @@ mod lane;
 mod level;
 mod limits;
 mod narrow;
+mod outcomes;
 mod ray;
 mod real;
+mod rows;
 mod series;
 mod unbounded;
 

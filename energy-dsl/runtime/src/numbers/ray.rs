@@ -6,10 +6,11 @@
 use std::cell::RefCell;
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
-use super::bundle::{Bundle, LANES, Outcomes, set_rays};
+use super::bundle::{Bundle, set_rays};
 use super::level::Level;
+use super::outcomes::{LANES, Outcomes};
 use super::real::{Mask, Number};
-use super::series::{LENGTHS, Limit, Series, Term, with_length};
+use super::series::{LENGTHS, Limit, Term, with_length};
 use super::unbounded::Unbounded;
 
 /// Evaluates a routine along rays. Returns also the rays along which the formula itself is degenerate.
@@ -20,8 +21,8 @@ thread_local! {
     static NUMBERS: RefCell<Vec<Bundle>> = const { RefCell::new(Vec::new()) };
     /// The comparisons of the bundle that this thread is computing, in order of evaluation.
     static COMPARISONS: RefCell<Vec<[Comparison; LANES]>> = const { RefCell::new(Vec::new()) };
-    /// Comparisons whose outcomes are reversed.
-    static REVERSED: RefCell<Vec<usize>> = const { RefCell::new(Vec::new()) };
+    /// Comparisons whose outcomes are reversed, and along which rays.
+    static REVERSED: RefCell<Vec<(usize, Outcomes)>> = const { RefCell::new(Vec::new()) };
 }
 
 /// A comparison of two numbers along a ray: the largest term of their difference; `None` if that is 0 or undefined.
@@ -65,17 +66,22 @@ impl Ray {
         found
     }
 
-    /// Returns what the routine would compute if some comparisons had the other outcome.
+    /// Returns what the routine would compute along a ray if the comparisons of each list had the other outcome.
     pub(super) fn evaluate_reversed(
-        comparisons: &[usize],
+        lists: &[Vec<usize>],
         x: &[Unbounded<f64>],
         slopes: &Vec<f64>,
         along: Along<'_>,
-    ) -> Found {
-        REVERSED.set(comparisons.to_vec());
-        let found = Self::evaluate_bundle(x, &[slopes], along).remove(0);
-        REVERSED.take();
-        found
+    ) -> Vec<Found> {
+        let bundle = |lists: &[Vec<usize>]| {
+            let rays = (0..lists.len()).map(|ray| Outcomes::of(|other| other == ray));
+            let reversed = lists.iter().zip(rays).flat_map(|(list, ray)| list.iter().map(move |&c| (c, ray)));
+            REVERSED.set(reversed.collect());
+            let found = Self::evaluate_to(LENGTHS[0], x, &vec![slopes; lists.len()], along).0;
+            REVERSED.take();
+            found
+        };
+        lists.chunks(LANES).flat_map(bundle).collect()
     }
 
     /// Returns the comparisons at x + slope · ε for the slopes of each ray.
@@ -142,8 +148,14 @@ fn compared(difference: &Bundle) -> [f64; LANES] {
         all.push(terms);
         all.len() - 1
     });
-    let turn = if REVERSED.with_borrow(|reversed| reversed.contains(&number)) { -1.0 } else { 1.0 };
-    terms.map(|term| term.map_or(0.0, |term| if term.is_negative() { -turn } else { turn }))
+    let is_reversed = |all: &Vec<(usize, Outcomes)>| {
+        let of_this = all.iter().filter(|(reversed, _)| *reversed == number);
+        of_this.fold(Outcomes::none(), |rays, (_, ray)| rays | *ray)
+    };
+    let reversed = REVERSED.with_borrow(is_reversed);
+    let sign =
+        |ray: usize| terms[ray].map_or(0.0, |term| if term.is_negative() != reversed.lane(ray) { -1.0 } else { 1.0 });
+    std::array::from_fn(sign)
 }
 
 macro_rules! operator {
@@ -198,28 +210,22 @@ impl Number for Ray {
         Self::select(self.less(other), other, self)
     }
     fn sin<L: Level>(self) -> Self {
-        self.map(|a| a.apart(|a| a.sin_cos().0))
+        self.map(Bundle::sin)
     }
     fn cos<L: Level>(self) -> Self {
-        self.map(|a| a.apart(|a| a.sin_cos().1))
+        self.map(Bundle::cos)
     }
     fn exp<L: Level>(self) -> Self {
-        self.map(|a| a.apart(Series::exp))
+        self.map(Bundle::exp)
     }
     fn ln<L: Level>(self) -> Self {
-        self.map(|a| a.apart(Series::ln))
+        self.map(Bundle::ln)
     }
     fn atan2<L: Level>(self, x: Self) -> Self {
-        self.map_two(x, |y, x| y.apart_with(x, Series::angle))
+        self.map_two(x, Bundle::angle)
     }
     fn powf<L: Level>(self, exponent: Self) -> Self {
-        self.map_two(exponent, |base, exponent| match exponent.constant() {
-            Some(exponent) => base.raised(exponent),
-            None => base.apart_with(exponent, |base, exponent| match exponent.finite() {
-                Some((constant, rest)) if rest.is_zero() => base.raised(constant),
-                _ => base.ln().times(exponent).exp(),
-            }),
-        })
+        self.map_two(exponent, Bundle::power)
     }
     // A series is exact: nothing is rounded.
     fn sum_error(self, _: Self) -> Self {

@@ -11,7 +11,7 @@ use super::unbounded::Unbounded;
 type Factor = Unbounded<f64>;
 
 /// Terms that a series keeps at first, and if these do not determine a limit.
-pub(super) const LENGTHS: [usize; 2] = [4, 10];
+pub(super) const LENGTHS: [usize; 2] = [3, 10];
 
 thread_local! {
     /// Terms that a series keeps.
@@ -46,36 +46,47 @@ const BEYOND: f64 = 1e6;
 /// The order of magnitude ε^power · ln(1/ε)^logs.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Order {
-    power: f64,
-    logs: f64,
+    pub(super) power: f64,
+    pub(super) logs: f64,
 }
 
 impl Order {
-    const ONE: Self = Self { power: 0.0, logs: 0.0 };
+    pub(super) const ONE: Self = Self { power: 0.0, logs: 0.0 };
     /// Smaller than everything: the first unknown term of an exact series.
-    const NEVER: Self = Self { power: f64::INFINITY, logs: 0.0 };
+    pub(super) const NEVER: Self = Self { power: f64::INFINITY, logs: 0.0 };
     /// Larger than everything: of such a series nothing is known.
     const ALWAYS: Self = Self { power: f64::NEG_INFINITY, logs: 0.0 };
 
     /// Compares magnitudes; the larger one comes first.
-    fn compare(self, other: Self) -> Ordering {
+    pub(super) fn compare(self, other: Self) -> Ordering {
         let by = |a: f64, b: f64| if (a - b).abs() < SAME || a == b { Ordering::Equal } else { a.total_cmp(&b) };
         by(self.power, other.power).then(by(other.logs, self.logs))
     }
 
-    fn is_larger_than(self, other: Self) -> bool {
+    pub(super) fn is_larger_than(self, other: Self) -> bool {
         self.compare(other) == Ordering::Less
     }
 
-    fn larger(self, other: Self) -> Self {
+    /// Returns the order this many whole powers of ε smaller.
+    pub(super) fn after(self, steps: usize) -> Self {
+        Self { power: self.power + steps as f64, ..self }
+    }
+
+    /// Returns whether orders differ by a whole power of ε.
+    pub(super) fn is_in_steps_from(self, other: Self) -> bool {
+        let step = self.power - other.power;
+        self.logs == other.logs && step == step.round() && step.abs() <= MOST_STEPS
+    }
+
+    pub(super) fn larger(self, other: Self) -> Self {
         if other.is_larger_than(self) { other } else { self }
     }
 
-    fn times(self, other: Self) -> Self {
+    pub(super) fn times(self, other: Self) -> Self {
         Self { power: self.power + other.power, logs: self.logs + other.logs }
     }
 
-    fn raised(self, exponent: f64) -> Self {
+    pub(super) fn raised(self, exponent: f64) -> Self {
         Self { power: self.power * exponent, logs: self.logs * exponent }
     }
 }
@@ -95,9 +106,18 @@ impl Term {
         Self { order, factor, doubt: 1.0 }
     }
 
-    /// Creates a factor times a power of ε.
-    pub(super) fn of_power(power: f64, by: f64, doubt: f64) -> Self {
-        Self { order: Order { power, logs: 0.0 }, factor: factor(by), doubt }
+    pub(super) fn of(order: Order, by: f64, doubt: f64) -> Self {
+        Self { order, factor: factor(by), doubt }
+    }
+
+    pub(super) fn order(self) -> Order {
+        self.order
+    }
+
+    /// Returns the factor and the size of its largest summand, if doubles have them.
+    pub(super) fn plain(self) -> Option<(f64, f64)> {
+        let plain = self.factor.to_scalar();
+        plain.is_normal().then_some((plain, plain.abs() * self.doubt))
     }
 
     /// Returns whether the term is negative.
@@ -167,31 +187,21 @@ impl Series {
         Self { terms: Vec::new(), unknown: Order::ALWAYS }
     }
 
-    /// Creates a series of terms in order, of which those from a power of ε on are unknown.
-    pub(super) fn of_powers(terms: Vec<Term>, unknown: f64) -> Self {
-        Self { terms, unknown: Order { power: unknown, logs: 0.0 } }
+    pub(super) fn terms(&self) -> &[Term] {
+        &self.terms
     }
 
-    /// Returns powers of ε, factors and doubts of all terms; `None` if there are powers of logarithms, or factors beyond
-    /// the range of doubles.
-    pub(super) fn powers(&self) -> Option<impl Iterator<Item = (f64, f64, f64)>> {
-        let is_plain = |term: &Term| term.order.logs == 0.0 && term.factor.to_scalar().is_normal();
-        let are_plain = self.unknown.logs == 0.0 && self.terms.iter().all(is_plain);
-        are_plain.then(|| self.terms.iter().map(|term| (term.order.power, term.factor.to_scalar(), term.doubt)))
+    pub(super) fn is_exact(&self) -> bool {
+        self.unknown.power == f64::INFINITY
     }
 
-    /// Returns the power of the largest term that is or may be there.
-    pub(super) fn leading_power(&self) -> f64 {
-        self.leading().power
-    }
-
-    /// Returns the power of the first unknown term.
-    pub(super) fn unknown_power(&self) -> f64 {
-        self.unknown.power
+    /// Returns the order of the first unknown term.
+    pub(super) fn unknown(&self) -> Order {
+        self.unknown
     }
 
     /// Sorts terms, adds those of one order, and drops those that are zero or unknown.
-    fn of(mut terms: Vec<Term>, unknown: Order) -> Self {
+    pub(super) fn of(mut terms: Vec<Term>, unknown: Order) -> Self {
         terms.sort_by(|a, b| a.order.compare(b.order));
         Self::sorted(terms, unknown)
     }
