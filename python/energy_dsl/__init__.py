@@ -13,19 +13,17 @@ Arrays hold one element per row: positions have the shape (n, points, 3), gradie
 from __future__ import annotations
 
 import functools as _functools
-import json as _json
 import os as _os
-from pathlib import Path as _Path
-
 from collections.abc import Callable as _Callable, Mapping as _Mapping
 from typing import TYPE_CHECKING, Any as _Any
 
-from ._energy import Element, Elements, EnergyError, FolderInUseError, Input, Simulation as _Simulation
+from ._energy import Element, Elements, EnergyError, FolderInUseError, Input, ResourceError, Simulation as _Simulation
 from ._energy import System as _System, audit as _audit, catalogue, energies, library_element as _library_element
 from ._energy import resume as _resume, run as _run, show
-from .sweep import Sweep, sweep
 
 if TYPE_CHECKING:
+    from .sweeps import Sweep, sweep
+
     import numpy as _np
     from numpy.typing import ArrayLike as _ArrayLike, NDArray as _NDArray
     from typing_extensions import Self as _Self
@@ -35,9 +33,23 @@ if TYPE_CHECKING:
     _Progress = _Callable[[int, int], object]
 
 __all__ = [
-    "AuditReport", "Element", "Elements", "EnergyError", "FolderInUseError", "Input", "Simulation", "Sweep", "System",
-    "audit", "catalogue", "element", "energies", "energy", "load", "resume", "run", "show", "simulate", "sweep",
+    "AuditReport", "Element", "Elements", "EnergyError", "FolderInUseError", "Input", "ResourceError", "Simulation",
+    "Sweep", "System", "audit", "catalogue", "element", "energies", "energy", "load", "resume", "run", "show", "simulate", "sweep",
 ]
+
+
+def __getattr__(name: str) -> _Any:
+    """Imports sweeps when they are first used: their executors take longer to import than the rest."""
+    if name in ("Sweep", "sweep"):
+        from . import sweeps
+
+        globals().update(Sweep=sweeps.Sweep, sweep=sweeps.sweep)
+        return globals()[name]
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})
 
 
 def energy(text: str, file: str = "<text>") -> Element:
@@ -53,8 +65,8 @@ def energy(text: str, file: str = "<text>") -> Element:
 
 def load(path: str | _os.PathLike[str]) -> list[Element]:
     """Compiles all declarations of a file (`.energy`)."""
-    path = _Path(path)
-    return energies(path.read_text(encoding="utf-8"), str(path))
+    with open(path, encoding="utf-8") as file:
+        return energies(file.read(), _os.fspath(path))
 
 
 @_functools.cache
@@ -91,8 +103,10 @@ class AuditReport:
 
 def audit(text: str, *, quick: bool = False, seed: int = 1, file: str = "<text>") -> AuditReport:
     """Compares all derivatives of a text with independent methods, and checks its claims, as `verify audit` does."""
+    import json
+
     passed, report, failures = _audit(text, quick=quick, seed=seed, file=file)
-    return AuditReport(passed, _json.loads(report), failures)
+    return AuditReport(passed, json.loads(report), failures)
 
 
 class System(_System):
@@ -122,9 +136,13 @@ class System(_System):
 def _scene(scene: _Scene) -> tuple[str, str]:
     """Returns the text of a scene, and the path at which relative paths start."""
     if isinstance(scene, _Mapping):
-        return _json.dumps(scene), "scene.toml"
-    path = _Path(scene)
-    return path.read_text(encoding="utf-8"), str(path)
+        import json
+
+        from .plain import plain
+
+        return json.dumps(scene, default=plain), "scene.toml"
+    with open(scene, encoding="utf-8") as file:
+        return file.read(), _os.fspath(scene)
 
 
 class Simulation(_Simulation):

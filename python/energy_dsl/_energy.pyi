@@ -1,6 +1,7 @@
 from collections.abc import Callable
 from os import PathLike
-from typing import Literal, TypeAlias, overload
+from pathlib import Path
+from typing import Any, Literal, TypeAlias, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
@@ -20,6 +21,9 @@ class EnergyError(ValueError):
 
 class FolderInUseError(EnergyError):
     """The output folder belongs to another process that still runs."""
+
+class ResourceError(RuntimeError):
+    """A run that the machine prevents, not its scene: a file cannot be written, or memory is short."""
 
 class Input:
     """An input of an element."""
@@ -237,5 +241,8 @@ def run(
 def resume(
     output: str, *, accept_edited: bool = False, threads: int | None = None, progress: Progress | None = None
 ) -> int: ...
+def input_files(text: str, path: str | PathLike[str]) -> list[Path]: ...
+def read_scene(path: str | PathLike[str]) -> dict[str, Any]: ...
+def version() -> str: ...
 def audit(text: str, quick: bool = False, seed: int = 1, file: str = "<text>") -> tuple[bool, str, list[str]]: ...
 def show(text: str, file: str = "<text>") -> str: ...

@@ -15,6 +15,7 @@ use pyo3::prelude::*;
 fn _energy(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("EnergyError", module.py().get_type::<errors::EnergyError>())?;
     module.add("FolderInUseError", module.py().get_type::<errors::FolderInUseError>())?;
+    module.add("ResourceError", module.py().get_type::<errors::ResourceError>())?;
     module.add_class::<element::Element>()?;
     module.add_class::<element::Input>()?;
     module.add_class::<evaluation::Elements>()?;
@@ -25,6 +26,9 @@ fn _energy(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(element::library_element, module)?)?;
     module.add_function(wrap_pyfunction!(simulation::run, module)?)?;
     module.add_function(wrap_pyfunction!(simulation::resume, module)?)?;
+    module.add_function(wrap_pyfunction!(simulation::input_files, module)?)?;
+    module.add_function(wrap_pyfunction!(simulation::read_scene, module)?)?;
+    module.add_function(wrap_pyfunction!(simulation::version, module)?)?;
     module.add_function(wrap_pyfunction!(tools::audit, module)?)?;
     module.add_function(wrap_pyfunction!(tools::show, module)?)
 }

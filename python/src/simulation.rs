@@ -4,13 +4,14 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use cloth_core::output::OutputError;
-use cloth_core::run::{Ending, Event, Run, RunError, RunOptions};
+use cloth_core::run::{Checkpoint, Ending, Event, Run, RunError, RunOptions};
 use cloth_core::scene::Scene;
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::exceptions::{PyKeyboardInterrupt, PyRuntimeError};
 use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyList};
 
-use crate::errors::{FolderInUseError, failed, wrong};
+use crate::errors::{FolderInUseError, ResourceError, failed, with_causes, wrong};
 use crate::exclusive::Exclusive;
 
 /// A scene that is stepped by hand.
@@ -146,8 +147,10 @@ pub fn run(
     let options = RunOptions { overwrite, checkpoint_interval: checkpoint, ignore_memory };
     let text = toml_text(text)?;
     to_the_end(py, threads, progress, || {
-        Run::new(text.clone(), Path::new(path), Path::new(output), options)
-            .map_err(|error| Refusal { message: with_line(&text, &error.to_string()), ..error.into() })
+        Run::new(text.clone(), Path::new(path), Path::new(output), options).map_err(|error| {
+            let Refusal { message, kind } = error.into();
+            Refusal { message: with_line(&text, &message), kind }
+        })
     })
 }
 
@@ -167,20 +170,39 @@ pub fn resume(
 /// Why a run cannot start.
 struct Refusal {
     message: String,
-    folder_is_in_use: bool,
+    kind: RefusalKind,
+}
+
+#[derive(Clone, Copy, PartialEq)]
+enum RefusalKind {
+    /// The scene or the folder is wrong.
+    Wrong,
+    /// Another process writes to the folder.
+    FolderInUse,
+    /// A file cannot be written, or memory is short.
+    Resources,
 }
 
 impl From<RunError> for Refusal {
     fn from(error: RunError) -> Self {
-        let folder_is_in_use = matches!(error, RunError::Output(OutputError::InUse { .. }));
-        Self { message: error.to_string(), folder_is_in_use }
+        let kind = match &error {
+            RunError::Output(OutputError::InUse { .. }) => RefusalKind::FolderInUse,
+            RunError::Output(OutputError::File { .. } | OutputError::Folder { .. }) | RunError::Memory { .. } => {
+                RefusalKind::Resources
+            }
+            _ => RefusalKind::Wrong,
+        };
+        Self { message: with_causes(&error), kind }
     }
 }
 
 /// How a run ended, without the interpreter's lock.
 enum Outcome {
     Refused(Refusal),
+    /// A step failed.
     Failed(String),
+    /// A file cannot be written.
+    Unwritten(String),
     Done(u64),
 }
 
@@ -213,7 +235,7 @@ fn to_the_end(
             }
         });
         match ending {
-            Err(error) => Outcome::Failed(error.to_string()),
+            Err(error) => Outcome::Unwritten(with_causes(&error)),
             Ok(Ending { failure: Some(failure), .. }) => Outcome::Failed(failure.to_string()),
             Ok(_) => Outcome::Done(run.simulation().steps_done()),
         }
@@ -223,11 +245,56 @@ fn to_the_end(
             Err(PyKeyboardInterrupt::new_err("the run was interrupted; its results so far were written"))
         }
         (Some(error), _) => Err(error),
-        (None, Outcome::Refused(Refusal { message, folder_is_in_use: true })) => {
-            Err(FolderInUseError::new_err(message))
-        }
-        (None, Outcome::Refused(Refusal { message, .. })) => Err(wrong(message)),
+        (None, Outcome::Refused(Refusal { message, kind })) => Err(match kind {
+            RefusalKind::Wrong => wrong(message),
+            RefusalKind::FolderInUse => FolderInUseError::new_err(message),
+            RefusalKind::Resources => ResourceError::new_err(message),
+        }),
+        (None, Outcome::Unwritten(message)) => Err(ResourceError::new_err(message)),
         (None, Outcome::Failed(message)) => Err(PyRuntimeError::new_err(message)),
         (None, Outcome::Done(steps)) => Ok(steps),
     }
+}
+
+/// Returns the paths of the meshes and materials that a scene names; none if the scene is invalid.
+#[pyfunction]
+pub fn input_files(text: &str, path: PathBuf) -> PyResult<Vec<PathBuf>> {
+    let text = toml_text(text)?;
+    Ok(Scene::parse(&text, &path).map_or_else(|_| Vec::new(), |scene| scene.input_files()))
+}
+
+/// Returns the tables of a scene file.
+#[pyfunction]
+pub fn read_scene<'py>(py: Python<'py>, path: PathBuf) -> PyResult<Bound<'py, PyAny>> {
+    let text = Scene::text(&path).map_err(|error| wrong(with_causes(&error)))?;
+    let table = text.parse::<toml::Table>().map_err(|error| wrong(format!("{}: {error}", path.display())))?;
+    object(py, &toml::Value::Table(table))
+}
+
+/// Returns a value of TOML as an object of Python. Dates, which no scene has, are texts.
+fn object<'py>(py: Python<'py>, value: &toml::Value) -> PyResult<Bound<'py, PyAny>> {
+    Ok(match value {
+        toml::Value::String(text) => text.into_pyobject(py)?.into_any(),
+        toml::Value::Integer(number) => number.into_pyobject(py)?.into_any(),
+        toml::Value::Float(number) => number.into_pyobject(py)?.into_any(),
+        toml::Value::Boolean(truth) => truth.into_pyobject(py)?.to_owned().into_any(),
+        toml::Value::Datetime(date) => date.to_string().into_pyobject(py)?.into_any(),
+        toml::Value::Array(list) => {
+            let list = list.iter().map(|value| object(py, value)).collect::<PyResult<Vec<_>>>()?;
+            PyList::new(py, list)?.into_any()
+        }
+        toml::Value::Table(table) => {
+            let dict = PyDict::new(py);
+            for (key, value) in table {
+                dict.set_item(key, object(py, value)?)?;
+            }
+            dict.into_any()
+        }
+    })
+}
+
+/// Version of the package and of the checkpoints that it reads and writes.
+#[pyfunction]
+pub fn version() -> String {
+    format!("{}, checkpoints {}", env!("CARGO_PKG_VERSION"), Checkpoint::VERSION)
 }
