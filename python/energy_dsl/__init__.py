@@ -15,7 +15,7 @@ from __future__ import annotations
 import functools as _functools
 import os as _os
 from collections.abc import Callable as _Callable, Mapping as _Mapping
-from typing import TYPE_CHECKING, Any as _Any
+from typing import TYPE_CHECKING, Any as _Any, NamedTuple as _NamedTuple
 
 from ._energy import Element, Elements, EnergyError, FolderInUseError, Input, ResourceError, Simulation as _Simulation
 from ._energy import System as _System, audit as _audit, catalogue, energies, library_element as _library_element
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     _Progress = _Callable[[int, int], object]
 
 __all__ = [
-    "AuditReport", "Element", "Elements", "EnergyError", "FolderInUseError", "Input", "ResourceError", "Simulation",
+    "AuditReport", "Element", "Elements", "EnergyError", "FolderInUseError", "Input", "Minimum", "ResourceError", "Simulation",
     "Sweep", "System", "audit", "catalogue", "element", "energies", "energy", "load", "resume", "run", "show", "simulate", "sweep",
 ]
 
@@ -109,28 +109,125 @@ def audit(text: str, *, quick: bool = False, seed: int = 1, file: str = "<text>"
     return AuditReport(passed, json.loads(report), failures)
 
 
-class System(_System):
-    """A sum of energies over the vertices of a mesh.
+class Minimum(_NamedTuple):
+    """Where `System.minimise` ended."""
 
-    `vertices` is their number. Those in `pinned` have no rows in the matrix. `add(element, stencils, **inputs)` adds
-    an element for each row of stencils.
+    #: Positions, (vertices, 3).
+    x: _NDArray[_np.float64]
+    #: U, in J.
+    energy: float
+    #: The largest component of the gradient at a free vertex, in N.
+    gradient: float
+    #: Steps of Newton's method.
+    iterations: int
+    #: Whether `gradient` is within the tolerance.
+    converged: bool
+
+
+class System(_System):
+    """A sum of energies, forces and residuals over the vertices of a mesh.
+
+    `vertices` is their number. Those in `pinned` have no rows in the matrix. `masses` (kg), of shape (vertices,), count
+    where a method has a factor `mass`.
+
+    `add(element, stencils, **inputs)` adds an element for each row of stencils, and returns the number of the term. A
+    residual whose unknowns are the coordinates of vertices adds ½ ‖r‖², with the Hessian JᵀJ of Gauss and Newton.
+    `set(term, **inputs)` changes inputs later. `pinned`, `masses` and `threads` can be assigned at any time.
+
+    `flags(x)` tells which elements are degenerate or outside of their formula's domain, where `energy` is infinite.
     """
 
-    def linearise(self, x: _ArrayLike, curvature: str = "exact") -> tuple[float, _NDArray[_np.float64], _Any]:
+    def linearise(
+        self, x: _ArrayLike, curvature: str = "exact", *, half: bool = False
+    ) -> tuple[float, _NDArray[_np.float64], _Any]:
         """Returns U (J), ∂U/∂x, and ∂²U/∂x² of the free vertices as a scipy.sparse.bsr_array.
 
         Elements whose vertices are all pinned are left out: they are constant.
         With `curvature` "clamped" or "absolute", element Hessians are made positive semi-definite first. The pattern
-        of the matrix stays the same from call to call.
+        of the matrix stays the same from call to call. With `half`, blocks below the diagonal are left out.
 
         Raises RuntimeError, which names the element, if one is outside of its formula's domain, such as an inverted
         triangle with a logarithm of its area. `energy` returns infinity there, so that a line search steps back.
+        Raises TypeError if the system has a force, which has no energy.
         """
+        U, gradient, blocks = self.linearise_blocks(x, curvature, half)
+        return U, gradient, self._matrix(blocks)
+
+    def linearise_forces(
+        self,
+        x: _ArrayLike,
+        v: _ArrayLike | None = None,
+        *,
+        position: float = -1.0,
+        velocity: float = 0.0,
+        mass: float = 0.0,
+        curvature: str = "exact",
+        half: bool = False,
+    ) -> tuple[_NDArray[_np.float64], _Any]:
+        """Returns f (N), of shape (vertices, 3), and the matrix position ∂f/∂x + velocity ∂f/∂v + mass M of the free
+        vertices as a scipy.sparse.bsr_array.
+
+        Energies act with f = −∂U/∂x. Velocities are 0 by default. A step of implicit Euler with step size h solves
+        (M − h² ∂f/∂x − h ∂f/∂v) Δv = h (f + h ∂f/∂x v): position=−h², velocity=−h, mass=1.
+        """
+        force, blocks = self.linearise_forces_blocks(
+            x, v, position=position, velocity=velocity, mass=mass, curvature=curvature, half=half
+        )
+        return force, self._matrix(blocks)
+
+    def _matrix(self, blocks: tuple[_Any, _Any, _Any]) -> _Any:
         from scipy.sparse import bsr_array
 
-        U, gradient, (offsets, columns, blocks) = self.linearise_blocks(x, curvature)
+        offsets, columns, numbers = blocks
         size = 3 * len(self.free)
-        return U, gradient, bsr_array((blocks, columns, offsets), shape=(size, size))
+        return bsr_array((numbers, columns, offsets), shape=(size, size))
+
+    def minimise(
+        self,
+        x: _ArrayLike,
+        *,
+        tolerance: float = 1e-9,
+        iterations: int = 100,
+        mass: float = 0.0,
+        target: _ArrayLike | None = None,
+    ) -> Minimum:
+        """Minimises U(x) + mass/2 Σ mᵢ ‖xᵢ − targetᵢ‖² over the free vertices.
+
+        Newton's method with sparse Cholesky factors and a line search; Hessians are exact where their sum is positive
+        definite, elsewhere those of elements are clamped. It ends where no component of the gradient exceeds
+        `tolerance` (N), or after `iterations` steps; `converged` tells. A step of implicit Euler from positions x with
+        velocities v and step size h has target = x + h v and mass = 1/h².
+
+        Raises RuntimeError if x is outside of a formula's domain, TypeError if the system has a force.
+        """
+        return Minimum(
+            *self.minimise_energy(x, tolerance=tolerance, iterations=iterations, mass=mass, target=target)
+        )
+
+    def __reduce__(self) -> tuple[_Any, ...]:
+        arguments = (self.vertices, self.pinned, self.masses)
+        return _system, (type(self), arguments, self.threads, self._terms(), self.__dict__)
+
+
+def _system(cls: type[System], arguments: tuple[_Any, ...], threads: int, terms: list[_Any], more: _Any) -> System:
+    """Makes a system from a pickle."""
+    system = cls.__new__(cls, *arguments)
+    system.threads = threads
+    for element, stencils, inputs in terms:
+        system.add(element, stencils, **inputs)
+    system.__dict__.update(more)
+    return system
+
+
+@_functools.lru_cache(maxsize=1024)
+def _declared(text: str, file: str, number: int) -> Element:
+    """Makes an element from a pickle. Workers that get one element many times compile it once."""
+    return energies(text, file)[number]
+
+
+def _bound(element: Element, count: int, dtype: str, threads: int, inputs: dict[str, _Any]) -> Elements:
+    """Binds elements from a pickle."""
+    return element.bind(count, dtype, threads=threads, **inputs)
 
 
 def _scene(scene: _Scene) -> tuple[str, str]:

@@ -6,6 +6,7 @@ mod errors;
 mod evaluation;
 mod exclusive;
 mod simulation;
+mod stencils;
 mod system;
 mod tools;
 
