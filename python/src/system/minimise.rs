@@ -80,6 +80,9 @@ pub fn minimise(assembly: &mut Assembly, mut x: Vec<Vector3<f64>>, goal: &Goal<'
     }
 }
 
+/// The gradient at the free vertices, and Newton's step; `None` if there is none.
+type GradientAndStep = (Vec<Vector3<f64>>, Option<Vec<Vector3<f64>>>);
+
 /// Returns the gradient at the free vertices, and the step −H⁻¹ g; `None` if no shift of H helps.
 fn newton_step(
     assembly: &mut Assembly,
@@ -87,7 +90,7 @@ fn newton_step(
     still: &[Vector3<f64>],
     goal: &Goal<'_>,
     cholesky: &mut Option<BlockCholesky>,
-) -> Result<(Vec<Vector3<f64>>, Option<Vec<Vector3<f64>>>), Failure> {
+) -> Result<GradientAndStep, Failure> {
     let mut gradient = Vec::new();
     for curvature in [Curvature::Exact, Curvature::Clamped] {
         let wanted = Wanted { position: -1.0, velocity: 0.0, mass: goal.mass, curvature };

@@ -30,6 +30,12 @@ pub struct System {
     bound: Mutex<Vec<(Element, Py<PyDict>)>>,
 }
 
+/// x, U, the largest component of the gradient, iterations, and whether it is within the tolerance.
+type Minimised<'py> = (Bound<'py, PyArray2<f64>>, f64, f64, usize, bool);
+
+/// The element, the stencils and the inputs of a term.
+type BoundTerm<'py> = (Element, Bound<'py, PyArray2<i64>>, Py<PyDict>);
+
 /// Offsets, columns and blocks of a matrix.
 type Matrix<'py> = (Bound<'py, PyArray1<i64>>, Bound<'py, PyArray1<i64>>, Bound<'py, PyArrayDyn<f64>>);
 
@@ -111,7 +117,7 @@ impl System {
     ) -> PyResult<usize> {
         let declaration = element.inner.declaration();
         let points = match declaration.kind {
-            Kind::Residual if element.unknown_count() % 3 == 0 => element.unknown_count() / 3,
+            Kind::Residual if element.unknown_count().is_multiple_of(3) => element.unknown_count() / 3,
             Kind::Residual => {
                 let (name, found) = (declaration.name, element.unknown_count());
                 let message = format!("{name}: expected three unknowns for each vertex, got {found} unknowns");
@@ -265,7 +271,7 @@ impl System {
         iterations: usize,
         mass: f64,
         target: Option<&Bound<'py, PyAny>>,
-    ) -> PyResult<(Bound<'py, PyArray2<f64>>, f64, f64, usize, bool)> {
+    ) -> PyResult<Minimised<'py>> {
         let (py, start) = (x.py(), self.vectors("x", x)?);
         let target = target.map(|target| self.vectors("target", target)).transpose()?;
         let mut state = self.state()?;
@@ -283,7 +289,7 @@ impl System {
     }
 
     /// The element, the stencils and copies of the inputs of each term.
-    fn _terms<'py>(&self, py: Python<'py>) -> PyResult<Vec<(Element, Bound<'py, PyArray2<i64>>, Py<PyDict>)>> {
+    fn _terms<'py>(&self, py: Python<'py>) -> PyResult<Vec<BoundTerm<'py>>> {
         let state = self.state()?;
         let bound = self.bound();
         let term = |((element, inputs), term): (&(Element, Py<PyDict>), &TermSource)| {
