@@ -57,7 +57,7 @@ mod system;
 mod terms;
 pub mod threads;
 
-pub use contact::{Contact, ContactCounts, ContactMemory, ContactModel, ContactsInMatrix, Pressed, Presser};
+pub use contact::{Contact, ContactCounts, ContactMemory, ContactModel, ContactsInMatrix, Pressed, Presser, Touching};
 pub use least_squares::{
     CouplingError, Couplings, GaussNewton, GaussNewtonError, GaussNewtonOptions, IterationReport, LeastSquaresTerm,
     Loss, NormalEquations, NormalMatrix, NormalPattern, NormalSolution, NormalSolver, NormalSolverKind, Outcome,

@@ -14,12 +14,12 @@ from __future__ import annotations
 
 import functools as _functools
 import os as _os
-from collections.abc import Callable as _Callable, Mapping as _Mapping
+from collections.abc import Callable as _Callable, Iterable as _Iterable, Mapping as _Mapping
 from typing import TYPE_CHECKING, Any as _Any, NamedTuple as _NamedTuple
 
 from ._energy import Element, Elements, EnergyError, FolderInUseError, Input, ResourceError, Simulation as _Simulation
-from ._energy import System as _System, audit as _audit, catalogue, energies, library_element as _library_element
-from ._energy import resume as _resume, run as _run, show
+from ._energy import Snapshot, System as _System, audit as _audit, catalogue, energies
+from ._energy import library_element as _library_element, resume as _resume, run as _run, show
 
 if TYPE_CHECKING:
     from .sweeps import Sweep, sweep
@@ -33,8 +33,9 @@ if TYPE_CHECKING:
     _Progress = _Callable[[int, int], object]
 
 __all__ = [
-    "AuditReport", "Element", "Elements", "EnergyError", "FolderInUseError", "Input", "Minimum", "ResourceError", "Simulation",
-    "Sweep", "System", "audit", "catalogue", "element", "energies", "energy", "load", "resume", "run", "show", "simulate", "sweep",
+    "AuditReport", "Contacts", "Element", "Elements", "EnergyError", "FolderInUseError", "Input", "Minimum",
+    "OwnEnergy", "OwnForce", "ResourceError", "Simulation", "Snapshot", "Sweep", "System", "audit", "catalogue",
+    "element", "energies", "energy", "load", "resume", "run", "show", "simulate", "sweep",
 ]
 
 
@@ -242,15 +243,148 @@ def _scene(scene: _Scene) -> tuple[str, str]:
         return file.read(), _os.fspath(scene)
 
 
+class OwnEnergy:
+    """An energy of a simulation that a function evaluates, for all elements at once.
+
+    `function(x, order)` gets positions (n, points, 3), and returns U of shape (n,) for order 0; U and ∂U/∂x of shape
+    (n, points, 3) for order 1; U, ∂U/∂x and ∂²U/∂x² of shape (n, 3 points, 3 points) for order 2. With
+    `hessians=False`, order 2 is not asked for, and integrators see no stiffness: good for weak pulls only.
+    `stencils`, of shape (n, points), names the vertices.
+    """
+
+    is_energy = True
+
+    def __init__(self, function: _Callable[..., _Any], stencils: _ArrayLike, *, hessians: bool = True) -> None:
+        if not callable(function):
+            raise TypeError(f"OwnEnergy: expected a function, got {type(function).__name__}")
+        self.function, self.stencils, self.jacobians = function, stencils, hessians
+
+
+class OwnForce:
+    """A force of a simulation that a function evaluates, for all elements at once.
+
+    `function(x, v, order)` gets positions and velocities (n, points, 3), and returns f of the same shape for order 1.
+    It is called once in each step, with the state at its start, and the force stays fixed over the step. So it suits
+    every integrator, if the force changes little within a step.
+
+    With `jacobians=True`, implicit integrators evaluate it at the end of a step, several times. It then returns f, ∂f/∂x
+    and ∂f/∂v, both of shape (n, 3 points, 3 points), for order 2. `newton` refuses such a force: it has no energy.
+    """
+
+    is_energy = False
+
+    def __init__(self, function: _Callable[..., _Any], stencils: _ArrayLike, *, jacobians: bool = False) -> None:
+        if not callable(function):
+            raise TypeError(f"OwnForce: expected a function, got {type(function).__name__}")
+        self.function, self.stencils, self.jacobians = function, stencils, jacobians
+
+
+class Contacts(_NamedTuple):
+    """Pairs of features in certified contact: a point and a triangle, or two edges."""
+
+    #: Vertices of the first feature, then of the second, (n, 4); -1 for those of obstacles.
+    vertices: _NDArray[_np.int64]
+    #: Number of vertices of the first feature, (n,): 1 for a point and a triangle, 2 for two edges.
+    first: _NDArray[_np.int64]
+    #: Distances of the features, in m, (n,).
+    distances: _NDArray[_np.float64]
+    #: Unit vectors from the second feature to the first, (n, 3).
+    normals: _NDArray[_np.float64]
+    #: Pushes along the normals, in N, without friction, (n,).
+    forces: _NDArray[_np.float64]
+
+
 class Simulation(_Simulation):
     """A scene of cloth, stepped by hand: a path of a TOML file, or a dictionary with the same keys.
 
-    `step` releases the interpreter's lock. A second thread that uses the same object meanwhile gets a RuntimeError.
+    A program may control it between steps:
+
+    - `positions` and `velocities` can be read and assigned;
+    - `move_pins(vertices, targets)` sets where pinned vertices are at the end of the next step;
+    - `move_obstacle(name, translation, rotation)` moves the obstacles that `obstacles` names;
+    - `wind` can be assigned with `wind=True`, if the scene has a wind;
+    - `forces` are own forces and energies by name: (element, stencils, inputs) of a text, whose inputs `set(name, …)`
+      changes, or functions: OwnEnergy, OwnForce;
+    - `snapshot()` and `restore(snapshot)` go back with the same bits; `reset()` goes back to the start, without
+      building anything;
+    - `term_forces()` (by the elements that have a free vertex), `contact_forces`, `contacts()` and, after `keep_ledger()`, `ledger()` are arrays.
+
+    `step` releases the interpreter's lock. A second thread that uses the same object meanwhile gets a RuntimeError. An
+    exception of an own function ends the step, and leaves the state before it.
     """
 
-    def __new__(cls, scene: _Scene, threads: int | None = None) -> _Self:
+    def __new__(
+        cls,
+        scene: _Scene,
+        threads: int | None = None,
+        *,
+        obstacles: _Iterable[str] = (),
+        wind: bool = False,
+        forces: _Mapping[str, tuple[Element, _Any, _Mapping[str, _Any]] | OwnEnergy | OwnForce] | None = None,
+    ) -> _Self:
         text, path = _scene(scene)
-        return super().__new__(cls, text, path, threads)
+        return cls._made(text, path, threads, list(obstacles), wind, dict(forces or {}))
+
+    @classmethod
+    def _made(
+        cls, text: str, path: str, threads: int | None, obstacles: list[str], wind: bool, forces: dict[str, _Any]
+    ) -> _Self:
+        texts, functions = [], []
+        for name, force in forces.items():
+            if isinstance(force, (OwnEnergy, OwnForce)):
+                functions.append((name, force.function, force.stencils, force.is_energy, force.jacobians))
+            elif isinstance(force, tuple) and len(force) == 3 and isinstance(force[0], Element):
+                texts.append((name, force[0], force[1], dict(force[2])))
+            else:
+                expected = "(element, stencils, inputs), OwnEnergy or OwnForce"
+                raise TypeError(f"forces, {name}: expected {expected}, got {type(force).__name__}")
+        self = super().__new__(cls, text, path, threads, obstacles, wind, texts, functions)
+        self._recipe = (text, _os.path.abspath(path), threads, obstacles, wind, forces)
+        self._start = None
+        return self
+
+    _recipe: tuple[_Any, ...]
+    _start: Snapshot | None
+
+    def step(self, steps: int = 1) -> int:
+        """Takes steps, at most to the end of the scene. Returns the number taken."""
+        if self._start is None:
+            self._start = self.snapshot()
+        return super().step(steps)
+
+    def reset(self) -> None:
+        """Goes back to the state before the first step, own parameters included."""
+        if self._start is not None:
+            self.restore(self._start)
+
+    def contacts(self) -> Contacts:
+        """Returns the pairs in certified contact at the end of the last step."""
+        return Contacts(*self.contact_pairs())
+
+    def ledger(self) -> dict[str, _NDArray[_np.float64]]:
+        """Returns the energy balance so far: `time` (s), then energies and works (J), one number for each step.
+
+        Raises RuntimeError unless `keep_ledger` was called.
+        """
+        columns = self.ledger_columns()
+        if columns is None:
+            raise RuntimeError("no ledger is kept; call keep_ledger() before the first step")
+        return dict(columns)
+
+    def __reduce__(self) -> tuple[_Any, ...]:
+        own = {name: value for name, value in self.__dict__.items() if name not in ("_recipe", "_start")}
+        return _simulation, (type(self), self._recipe, self.snapshot(), self._start, own)
+
+
+def _simulation(
+    cls: type[Simulation], recipe: tuple[_Any, ...], now: Snapshot, start: Snapshot | None, more: dict[str, _Any]
+) -> Simulation:
+    """Makes a simulation from a pickle."""
+    simulation = cls._made(*recipe)
+    simulation.restore(now)
+    simulation._start = start
+    simulation.__dict__.update(more)
+    return simulation
 
 
 def simulate(

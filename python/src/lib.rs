@@ -22,14 +22,15 @@ fn _energy(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<evaluation::Elements>()?;
     module.add_class::<system::System>()?;
     module.add_class::<simulation::Simulation>()?;
+    module.add_class::<simulation::Snapshot>()?;
     module.add_function(wrap_pyfunction!(element::energies, module)?)?;
     module.add_function(wrap_pyfunction!(element::catalogue, module)?)?;
     module.add_function(wrap_pyfunction!(element::library_element, module)?)?;
-    module.add_function(wrap_pyfunction!(simulation::run, module)?)?;
-    module.add_function(wrap_pyfunction!(simulation::resume, module)?)?;
-    module.add_function(wrap_pyfunction!(simulation::input_files, module)?)?;
-    module.add_function(wrap_pyfunction!(simulation::read_scene, module)?)?;
-    module.add_function(wrap_pyfunction!(simulation::version, module)?)?;
+    module.add_function(wrap_pyfunction!(simulation::runs::run, module)?)?;
+    module.add_function(wrap_pyfunction!(simulation::runs::resume, module)?)?;
+    module.add_function(wrap_pyfunction!(simulation::runs::input_files, module)?)?;
+    module.add_function(wrap_pyfunction!(simulation::runs::read_scene, module)?)?;
+    module.add_function(wrap_pyfunction!(simulation::runs::version, module)?)?;
     module.add_function(wrap_pyfunction!(tools::audit, module)?)?;
     module.add_function(wrap_pyfunction!(tools::show, module)?)
 }

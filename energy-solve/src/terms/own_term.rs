@@ -11,7 +11,7 @@ use crate::matrix::vector::block_times;
 use crate::terms::counts::Tally;
 use crate::terms::curvature::{Curvature, change_dense};
 use crate::terms::linearisation::Linearisation;
-use crate::terms::state::State;
+use crate::terms::state::{State, StepStart};
 use crate::terms::stencils::Stencils;
 use crate::terms::term::{Character, PlacedTerm, Quantity, Term, TermDescription};
 
@@ -55,6 +55,9 @@ pub trait OwnLaw: Debug + Send + Sync {
     fn has_energy(&self) -> bool;
     /// Writes the results of an order. `x` and `v` hold the points of one element after the other, 3 p numbers each.
     fn evaluate(&self, order: Order, x: &[f64], v: &[f64], results: &mut OwnResults);
+    /// Notes the state at the start of a step, for a law that stays fixed over the step. `x` and `v` are as in
+    /// [`OwnLaw::evaluate`].
+    fn begin_step(&mut self, _x: &[f64], _v: &[f64]) {}
     /// Whether the force at fixed positions and velocities may have changed since the last step. Islands that it acts
     /// on then do not sleep.
     fn varies(&self) -> bool {
@@ -241,6 +244,11 @@ impl<L: OwnLaw> TermDescription for PlacedOwnTerm<L> {
 }
 
 impl<L: OwnLaw> PlacedTerm for PlacedOwnTerm<L> {
+    fn begin_step(&mut self, start: StepStart<'_>) {
+        let (x, v) = (self.gathered(start.state.x), self.gathered(start.state.v));
+        self.term.law.begin_step(&x, &v);
+    }
+
     fn is_driven(&self) -> bool {
         true
     }

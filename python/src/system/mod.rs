@@ -1,7 +1,7 @@
 //! Sums of elements over the vertices of a mesh.
 
 mod assembly;
-mod laws;
+pub mod laws;
 mod minimise;
 
 use std::sync::{Mutex, MutexGuard, PoisonError};

@@ -1,4 +1,4 @@
-//! Scenes of cloth: stepped by hand, or run to an output folder.
+//! Scenes of cloth, run to an output folder.
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -6,22 +6,14 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use cloth_core::output::OutputError;
 use cloth_core::run::{Checkpoint, Ending, Event, Run, RunError, RunOptions};
 use cloth_core::scene::Scene;
-use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::exceptions::{PyKeyboardInterrupt, PyRuntimeError};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 
-use crate::errors::{FolderInUseError, ResourceError, failed, with_causes, wrong};
-use crate::exclusive::Exclusive;
-
-/// A scene that is stepped by hand.
-#[pyclass(frozen, subclass, module = "energy_dsl")]
-pub struct Simulation {
-    inner: Exclusive<cloth_core::Simulation>,
-}
+use crate::errors::{FolderInUseError, ResourceError, with_causes, wrong};
 
 /// A scene's text; JSON objects are written as TOML.
-fn toml_text(text: &str) -> PyResult<String> {
+pub(super) fn toml_text(text: &str) -> PyResult<String> {
     if !text.trim_start().starts_with('{') {
         return Ok(text.to_owned());
     }
@@ -30,100 +22,12 @@ fn toml_text(text: &str) -> PyResult<String> {
 }
 
 /// Adds the line that a message about a text names: of a dictionary, users never see the text.
-fn with_line(text: &str, message: &str) -> String {
+pub(super) fn with_line(text: &str, message: &str) -> String {
     let number = message.split(':').nth(1).and_then(|number| number.parse::<usize>().ok());
     match number.and_then(|number| text.lines().nth(number.checked_sub(1)?)) {
         Some(line) => format!("{message}: {}", line.trim()),
         None => message.to_owned(),
     }
-}
-
-#[pymethods]
-impl Simulation {
-    /// Reads the text of a scene. Relative paths in it start at the folder of `path`.
-    #[new]
-    #[pyo3(signature = (text, path = PathBuf::from("scene.toml"), threads = None))]
-    fn new(py: Python<'_>, text: &str, path: PathBuf, threads: Option<usize>) -> PyResult<Self> {
-        let text = toml_text(text)?;
-        let inner = py.detach(|| {
-            let scene = Scene::parse(&text, &path).map_err(|error| with_line(&text, &error.to_string()))?;
-            cloth_core::Simulation::new(&scene).map_err(|error| error.to_string())
-        });
-        let inner = match (inner.map_err(wrong)?, threads) {
-            (inner, Some(threads)) => inner.with_threads(threads),
-            (inner, None) => inner,
-        };
-        Ok(Self { inner: Exclusive::new("Simulation", inner) })
-    }
-
-    /// Takes steps of the scene's time grid, at most until its end. Returns the number taken. Ctrl-C stops after the
-    /// current step.
-    #[pyo3(signature = (steps = 1))]
-    fn step(&self, py: Python<'_>, steps: u64) -> PyResult<u64> {
-        let mut guard = self.inner.get()?;
-        let simulation = &mut *guard;
-        for done in 0..steps {
-            if simulation.is_finished() {
-                return Ok(done);
-            }
-            py.check_signals()?;
-            py.detach(|| simulation.step().map(drop)).map_err(failed)?;
-        }
-        Ok(steps)
-    }
-
-    /// Time, in s.
-    #[getter]
-    fn time(&self) -> PyResult<f64> {
-        Ok(self.inner.get()?.time())
-    }
-
-    #[getter]
-    fn is_finished(&self) -> PyResult<bool> {
-        Ok(self.inner.get()?.is_finished())
-    }
-
-    /// Steps from start to end.
-    #[getter]
-    fn steps(&self) -> PyResult<u64> {
-        Ok(self.inner.get()?.steps())
-    }
-
-    /// Steps taken so far.
-    #[getter]
-    fn steps_done(&self) -> PyResult<u64> {
-        Ok(self.inner.get()?.steps_done())
-    }
-
-    #[getter]
-    fn warnings(&self) -> PyResult<Vec<String>> {
-        Ok(self.inner.get()?.warnings().to_vec())
-    }
-
-    /// Positions of all vertices, in m, as a new array of shape (vertices, 3).
-    #[getter]
-    fn positions<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        vectors(py, self.inner.get()?.positions())
-    }
-
-    /// Velocities of all vertices, in m/s.
-    #[getter]
-    fn velocities<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        vectors(py, self.inner.get()?.velocities())
-    }
-
-    /// Triangles, as indices of vertices.
-    #[getter]
-    fn triangles<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<i64>>> {
-        let simulation = self.inner.get()?;
-        let numbers: Vec<i64> = simulation.triangles().iter().flatten().map(|&vertex| vertex as i64).collect();
-        let rows = numbers.len() / 3;
-        PyArray1::from_vec(py, numbers).reshape([rows, 3])
-    }
-}
-
-fn vectors<'py>(py: Python<'py>, vectors: &[[f64; 3]]) -> PyResult<Bound<'py, PyArray2<f64>>> {
-    PyArray1::from_vec(py, vectors.as_flattened().to_vec()).reshape([vectors.len(), 3])
 }
 
 /// Runs a scene and writes its results to a folder, as `cloth run` does. Returns the number of steps taken.
