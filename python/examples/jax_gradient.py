@@ -7,13 +7,14 @@ import numpy as np
 import energy_dsl as ed
 import energy_dsl.jax as edj
 
-jax.config.update("jax_enable_x64", True)
+jax.config.update("jax_enable_x64", True)  # type: ignore[no-untyped-call]
 spring = ed.energy("energy Spring(p, q: Point; k, L: Scalar) { k / 2 * (norm(p - q) - L)^2 }")
 energies = edj.function(spring, k=2.0, L=1.0)
 
 
-def energy(x):
-    return energies(x).sum()
+def energy(x: jax.Array) -> jax.Array:
+    total: jax.Array = energies(x).sum()
+    return total
 
 
 x = jnp.asarray(np.random.default_rng(1).normal(size=(100, 2, 3)))

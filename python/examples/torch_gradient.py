@@ -14,7 +14,7 @@ optimiser = torch.optim.SGD([x], lr=0.2)
 for _ in range(50):
     optimiser.zero_grad()
     U = energy(x).sum()
-    U.backward()
+    U.backward()  # type: ignore[no-untyped-call]
     optimiser.step()
 print(f"gradient descent: U = {U.item():.2e} J")
 
