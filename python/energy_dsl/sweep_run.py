@@ -21,8 +21,14 @@ RECORD = "sweep.json"
 MARK = "sweep.running"
 #: Seconds so far of a run that was interrupted.
 CLOCK = "sweep.seconds"
-#: Seconds between two looks whether the parent process still lives.
-WATCH = 0.5
+#: Seconds between two looks whether the parent process still lives, and for a run to end after that.
+WATCH, GRACE = 0.2, 5.0
+
+#: The process whose parent is watched. A fork inherits the number, but not the thread that watches.
+_watcher = 0
+#: Set once the parent of this worker has ended.
+_orphaned = threading.Event()
+_busy = threading.Event()
 
 
 class _Unfit(Exception):
@@ -36,6 +42,7 @@ class _Orphaned(BaseException):
 def run_one(job: dict[str, Any]) -> dict[str, Any]:
     """Runs one choice of a sweep in its folder, unless that is done. Workers call it."""
     folder = Path(job["folder"])
+    _watch_parent()
     try:
         result = _kept(folder, job["retry"])
         if result is not None:
@@ -45,6 +52,29 @@ def run_one(job: dict[str, Any]) -> dict[str, Any]:
         if threading.current_thread() is threading.main_thread():
             os._exit(1)
         raise
+
+
+def _watch_parent() -> None:
+    """Lets a worker of a pool of processes end with its parent. Otherwise, a worker that waits for work would wait
+    forever, and one at a run would hold the folder."""
+    global _watcher
+    is_worker = multiprocessing.parent_process() is not None and threading.current_thread() is threading.main_thread()
+    if is_worker and _watcher != os.getpid():
+        _watcher = os.getpid()
+        _orphaned.clear()
+        threading.Thread(target=_end_with_parent, args=(os.getppid(),), daemon=True).start()
+
+
+def _end_with_parent(parent: int) -> None:
+    process = multiprocessing.parent_process()
+    while os.getppid() == parent and (os.name == "posix" or process is None or process.is_alive()):
+        time.sleep(WATCH)
+    _orphaned.set()
+    # A run stops after its current step, with a checkpoint.
+    deadline = time.monotonic() + GRACE
+    while _busy.is_set() and time.monotonic() < deadline:
+        time.sleep(0.05)
+    os._exit(1)
 
 
 def failed(job: dict[str, Any], message: str, seconds: float = 0.0) -> dict[str, Any]:
@@ -98,6 +128,7 @@ def _run_marked(job: dict[str, Any], folder: Path) -> dict[str, Any]:
         return round(earlier + time.perf_counter() - start, 3)
 
     status, message, results = "done", "", {}
+    _busy.set()
     try:
         folder.mkdir(parents=True, exist_ok=True)
         replace(folder / MARK, str(job["token"]))
@@ -122,6 +153,7 @@ def _run_marked(job: dict[str, Any], folder: Path) -> dict[str, Any]:
         message = f"run {folder.name}: {error}; the next call tries again"
         return failed(job, message, seconds())
     finally:
+        _busy.clear()
         (folder / MARK).unlink(missing_ok=True)
 
 
@@ -147,20 +179,18 @@ def _run_when_free(job: dict[str, Any], folder: Path, seconds: Callable[[], floa
 
 def _run(job: dict[str, Any], folder: Path, seconds: Callable[[], float]) -> None:
     _check_inputs(job)
-    parent, looked, steps = multiprocessing.parent_process(), time.monotonic(), 0
+    steps = 0
 
     def after_step(step: int, _steps: int) -> None:
-        nonlocal looked, steps
+        nonlocal steps
         if steps == 0:
             # The files were read by now: those that the folder is named after, or others.
             _check_inputs(job)
         steps += 1
         if step % job["checkpoint"] == 0:
             _note_time(folder, seconds())
-        if time.monotonic() - looked > WATCH:
-            looked = time.monotonic()
-            if parent is not None and not parent.is_alive():
-                raise _Orphaned
+        if _orphaned.is_set():
+            raise _Orphaned
 
     if (folder / "checkpoint").exists():
         try:

@@ -33,7 +33,11 @@ SCENE: dict[str, Any] = {
     "fabric": {"density": 0.2, "material": {"stvk": {"stretch_stiffness": 40.0, "poisson_ratio": 0.3}}},
     "pins": [{"nearest": [-0.3, 0.3, 0.0]}, {"nearest": [0.3, 0.3, 0.0]}],
     "obstacles": [
-        {"name": "bar", "capsule": {"from": [-0.5, 0.0, -0.35], "to": [0.5, 0.0, -0.35], "radius": 0.03}, "friction": 0.3}
+        {
+            "name": "bar",
+            "capsule": {"from": [-0.5, 0.0, -0.35], "to": [0.5, 0.0, -0.35], "radius": 0.03},
+            "friction": 0.3,
+        }
     ],
 }
 

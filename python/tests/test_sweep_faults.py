@@ -251,11 +251,21 @@ def test_workers_of_a_killed_parent_end(tmp_path):
         parent.kill()
         parent.wait()
         wait_for(lambda: not list(tmp_path.glob("*/cloth.lock")))
+        wait_for(lambda: not alive_in_group(parent.pid))
     finally:
         try:
             os.killpg(parent.pid, signal.SIGKILL)
         except ProcessLookupError:
             pass
+
+
+def alive_in_group(group):
+    """Returns whether a process of a group lives."""
+    try:
+        os.killpg(group, 0)
+    except ProcessLookupError:
+        return False
+    return True
 
 
 def wait_for(condition, seconds=30):
