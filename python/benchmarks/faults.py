@@ -77,7 +77,8 @@ def files(folder: Path) -> dict[str, bytes]:
 
 def start(engine: str, scene: Path, output: Path) -> subprocess.Popen[str]:
     command = [sys.executable, "-c", PROGRAM, engine, str(scene), str(output)]
-    return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, start_new_session=True)
+    pipe = subprocess.PIPE
+    return subprocess.Popen(command, stdout=pipe, stderr=subprocess.STDOUT, text=True, start_new_session=True)
 
 
 def finished(engine: str, scene: Path, output: Path) -> str:
@@ -167,7 +168,8 @@ def main() -> int:
             found, wanted = files(place / "runs"), expected[0.6 if fault == "edit" else 0.3]
             bad = {file for file in wanted if found.get(file) != wanted[file]}
             wrong += bool(bad)
-            print(f"{number:3} {fault:16} {engine:10} {'wrong: ' + str(sorted(bad)) + told if bad else 'right'}", flush=True)
+            verdict = f"wrong: {sorted(bad)} {told}" if bad else "right"
+            print(f"{number:3} {fault:16} {engine:10} {verdict}", flush=True)
             if fault == "full disk" and options.disk:
                 for entry in options.disk.iterdir():
                     shutil.rmtree(entry) if entry.is_dir() else entry.unlink()

@@ -267,8 +267,8 @@ class OwnForce:
     It is called once in each step, with the state at its start, and the force stays fixed over the step. So it suits
     every integrator, if the force changes little within a step.
 
-    With `jacobians=True`, implicit integrators evaluate it at the end of a step, several times. It then returns f, ∂f/∂x
-    and ∂f/∂v, both of shape (n, 3 points, 3 points), for order 2. `newton` refuses such a force: it has no energy.
+    With `jacobians=True`, implicit integrators evaluate it at the end of a step, several times. It then returns f,
+    ∂f/∂x and ∂f/∂v, both of shape (n, 3 points, 3 points), for order 2. `newton` refuses such a force: it has no energy.
     """
 
     is_energy = False
@@ -307,7 +307,8 @@ class Simulation(_Simulation):
       changes, or functions: OwnEnergy, OwnForce;
     - `snapshot()` and `restore(snapshot)` go back with the same bits; `reset()` goes back to the start, without
       building anything;
-    - `term_forces()` (by the elements that have a free vertex), `contact_forces`, `contacts()` and, after `keep_ledger()`, `ledger()` are arrays.
+    - `term_forces()` (of the elements that have a free vertex), `contact_forces`, `contacts()` and, after
+      `keep_ledger()`, `ledger()` are arrays.
 
     `step` releases the interpreter's lock. A second thread that uses the same object meanwhile gets a RuntimeError. An
     exception of an own function ends the step, and leaves the state before it.

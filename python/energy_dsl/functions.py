@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Mapping
 from typing import Any
 
@@ -37,22 +38,25 @@ class Kernel:
                 self.each.add(name)
             self.inputs[name] = array
         self.bound: dict[tuple[int, str], Elements] = {}
+        self.lock = threading.Lock()
         # Wrong inputs are refused at once, not in the first call.
         self.of(1 if self.count is None else self.count, "float64")
 
     def of(self, count: int, dtype: str) -> Elements:
         """Returns so many bound elements. Those of the last few sizes are kept."""
         key = (count, dtype)
-        if key not in self.bound:
-            times = count // self.count if self.count else 1
-            inputs: dict[str, Any] = {
-                name: np.concatenate([value] * times) if name in self.each else value
-                for name, value in self.inputs.items()
-            }
-            if len(self.bound) >= 8:
-                self.bound.pop(next(iter(self.bound)))
-            self.bound[key] = self.element.bind(count, dtype, **inputs)
-        return self.bound[key]
+        # Compiled functions call back from several threads.
+        with self.lock:
+            if key not in self.bound:
+                times = count // self.count if self.count else 1
+                inputs: dict[str, Any] = {
+                    name: np.concatenate([value] * times) if name in self.each else value
+                    for name, value in self.inputs.items()
+                }
+                if len(self.bound) >= 8:
+                    self.bound.pop(next(iter(self.bound)))
+                self.bound[key] = self.element.bind(count, dtype, **inputs)
+            return self.bound[key]
 
     def leading(self, shape: tuple[int, ...], name: str) -> tuple[int, ...]:
         """Returns the leading axes of an argument."""

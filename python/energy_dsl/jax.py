@@ -33,7 +33,8 @@ def function(element: Element, **inputs: Any) -> Callable[..., Any]:
     `grad`, `jvp`, `vjp`, `jacfwd`, `jacrev`, `hessian`, `vmap` and `jit` work, with first and second derivatives of
     energies and first ones of forces and residuals. Arrays of float32 are evaluated in single precision.
 
-    Raises NotImplementedError for higher derivatives, TypeError for inputs that are traced, ValueError for wrong shapes.
+    Raises NotImplementedError for higher derivatives, TypeError for inputs that are traced, ValueError for wrong
+    shapes.
     """
     found = kernel(element, inputs)
     if element.kind == "force":
@@ -65,7 +66,7 @@ def _floating(x: Any) -> Any:
 
 
 def _final(kernel: Kernel, function: Callable[..., Any], what: str) -> Callable[..., Any]:
-    """Returns a function whose derivatives are refused by name. Those of a callback would be an error without a name."""
+    """Returns a function whose derivatives are refused by name. Those of a callback are errors without a name."""
     final = jax.custom_jvp(function)
 
     def refuse(primals: Any, tangents: Any) -> Any:

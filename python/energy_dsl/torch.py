@@ -34,8 +34,8 @@ def function(element: Element, **inputs: Any) -> Callable[..., torch.Tensor]:
     evaluated in single precision.
 
     Raises NotImplementedError for higher derivatives, and for forward over forward mode (`jvp` of `jvp`), where torch
-    loses the tangents of functions that it does not know; TypeError for inputs that require a gradient, ValueError for wrong
-    shapes.
+    loses the tangents of functions that it does not know; TypeError for inputs that require a gradient, ValueError for
+    wrong shapes.
     """
     found = kernel(element, inputs)
     if element.kind == "force":

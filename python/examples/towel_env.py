@@ -76,7 +76,8 @@ class TowelEnv(gymnasium.Env if gymnasium else object):  # type: ignore[misc]
         return self.observation(), reward, False, self.simulation.is_finished, {}
 
     def observation(self) -> Array:
-        return np.stack([self.simulation.positions[self.seen], self.simulation.velocities[self.seen]]).astype(np.float32)
+        state = [self.simulation.positions, self.simulation.velocities]
+        return np.stack([vectors[self.seen] for vectors in state]).astype(np.float32)
 
 
 def rollout(env: TowelEnv, seed: int) -> float:

@@ -94,7 +94,8 @@ def test_own_text_equals_a_weight(integrator):
 def test_functions_equal_the_text(integrator):
     t, k = np.array([0.1, -0.1, 0.3]), 5.0
     stencils = np.array([[0], [7], [22]])
-    text = simulated({**SHEET, "integrator": integrator}, forces={"pull": (ed.energy(PULL), stencils, {"t": t, "k": k})})
+    own = (ed.energy(PULL), stencils, {"t": t, "k": k})
+    text = simulated({**SHEET, "integrator": integrator}, forces={"pull": own})
     orders = set()
 
     def pull(x, order):

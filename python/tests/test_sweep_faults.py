@@ -28,7 +28,8 @@ def swept(scene, grid, folder, **options):
 def mesh_scene(folder, z=0.3):
     (folder / "tent.obj").write_text(TENT.format(z=z))
     lines = [
-        'dt = 0.01', 'duration = 0.1', 'mesh.obj.path = "tent.obj"', 'pins = [{ vertex = 0 }]', 'output.size = [120, 100]',
+        'dt = 0.01', 'duration = 0.1', 'mesh.obj.path = "tent.obj"', 'pins = [{ vertex = 0 }]',
+        'output.size = [120, 100]',
         '[fabric]', 'density = 0.15', 'material.stvk = { stretch_stiffness = 50.0, poisson_ratio = 0.3 }',
     ]
     (folder / "scene.toml").write_text("\n".join(lines))

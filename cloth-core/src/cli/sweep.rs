@@ -40,8 +40,8 @@ struct Choice {
     values: Vec<Value>,
     /// Text of the scene.
     text: String,
-    /// Name of the folder: a hash of everything that the run reads. The same run continues in the same folder, and after
-    /// an edit of a mesh, no earlier result counts.
+    /// Name of the folder: a hash of everything that the run reads. The same run continues in the same folder. After an
+    /// edit of a mesh, no earlier result counts.
     name: String,
 }
 

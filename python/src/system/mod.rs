@@ -169,7 +169,8 @@ impl System {
         py.detach(|| state.energies(&positions)).map_err(PyErr::from)
     }
 
-    /// Returns f of all vertices, of shape (vertices, 3): −∂U/∂x and the forces of laws at velocities `v`, 0 by default.
+    /// Returns f of all vertices, of shape (vertices, 3): −∂U/∂x, and the forces of laws at velocities `v`; 0 by
+    /// default.
     #[pyo3(signature = (x, v = None))]
     fn forces<'py>(&self, x: &Bound<'py, PyAny>, v: Option<&Bound<'py, PyAny>>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let (py, x, v) = (x.py(), self.vectors("x", x)?, self.velocities(v)?);

@@ -65,14 +65,14 @@ pub enum ControlError {
     WindOfScene,
     /// An element joins vertices that move on their own.
     #[error(
-        "{name}: element {element} joins vertices {first} and {second}, which move on their own. Sew their garments, or \
-         set `contact = \"on\"`"
+        "{name}: element {element} joins vertices {first} and {second}, which move on their own. Sew their garments, \
+         or set `contact = \"on\"`"
     )]
     Apart { name: String, element: usize, first: usize, second: usize },
     /// A function evaluates elements that move on their own.
     #[error(
-        "{name}: its elements act on garments that move on their own, but one function evaluates them together. Add one \
-         for each garment, or set `contact = \"on\"`"
+        "{name}: its elements act on garments that move on their own, but one function evaluates them together. Add \
+         one for each garment, or set `contact = \"on\"`"
     )]
     Divided { name: String },
     /// The number of vectors is wrong.
