@@ -207,18 +207,19 @@ fn summed(term: Box<dyn Term>, curvature: Curvature) -> (f64, Vec<Vector3<f64>>,
 
 #[test]
 fn own_laws_and_steered_tapes_sum_as_declared_elements_do() {
-    let stencils = [[0, 1], [1, 2], [2, 4], [4, 0]];
+    let stencils: [[usize; 2]; 4] = [[0, 1], [1, 2], [2, 4], [4, 0]];
+    let vertices: Vec<u32> = stencils.concat().iter().map(|&vertex| vertex as u32).collect();
     let stiffness = vec![1.0, 2.0, 3.0, 4.0];
     let list = |stiffness: &[f64]| {
         let springs = stiffness.iter().map(|&k| ZeroLengthSpring::new(k, 0.0)).collect();
         Box::new(PotentialTerm::new(ElementList::new("springs", springs, &stencils).unwrap()))
     };
-    let own = OwnTerm::new("own".to_owned(), OwnSprings(stiffness.clone()), stencils.concat());
+    let own = OwnTerm::new("own".to_owned(), OwnSprings(stiffness.clone()), vertices);
     let text = "energy S(p, q: Point; k: Scalar) { k / 2 * norm_squared(p - q) }";
     let element = Interpreted::from_source(text).unwrap().remove(0);
     let bound = |stiffness: &[f64]| element.elements(4, &[], &[Column::Each(stiffness)]).unwrap().tape().clone();
     let tapes = SteeredTapes::new(bound(&[9.0; 4]));
-    let vertices = stencils.concat().into_iter().map(|vertex| vertex as usize);
+    let vertices = stencils.concat();
     let steered = SteeredTapeTerm::new("steered".to_owned(), element.declaration(), tapes.clone(), vertices);
     let expected = summed(list(&stiffness), Curvature::Clamped);
     // New parameters reach a term that is placed after the change at once, and others at the start of a step.
