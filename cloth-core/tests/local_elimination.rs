@@ -33,7 +33,8 @@ fn body(
     let surroundings = Surroundings { gravity: [0.0, 0.0, -9.81], drag: 0.5 };
     let springs = SpringNetwork::of_mesh(&cloth_core::mesh::Topology::of(mesh));
     let mut garment = terms(&fabric, mesh, &springs, &surroundings).unwrap();
-    let wind = Wind { velocity: [8.0, 0.5, 2.0], gusts: Vec::new(), density: 1.2, across: 1.2, along: 0.02 };
+    let (velocity, gusts) = ([8.0, 0.5, 2.0], Vec::new());
+    let wind = Wind { velocity, gusts, density: 1.2, across: 1.2, along: 0.02, steering: None };
     garment.terms.push(wind.term(mesh.triangles()));
     garment.terms.extend(more);
     let pinned: Vec<bool> = (0..mesh.vertices().len()).map(is_pinned).collect();

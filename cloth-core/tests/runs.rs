@@ -517,3 +517,24 @@ fn a_sweep_runs_all_combinations_and_continues_where_it_was_killed() {
     let message = refused(&["sweep", "scene.toml", "values.toml", "-o", "wrong"], folder.path());
     assert!(message.contains("dt: expected a list of values"), "{message}");
 }
+
+#[test]
+fn a_sweep_after_an_edit_of_a_mesh_does_not_return_earlier_results() {
+    let folder = tempfile::tempdir().unwrap();
+    let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).unwrap();
+    let scene = "dt = 0.01\nduration = 0.05\nmesh.obj.path = \"tent.obj\"\npins = [{ vertex = 0 }]\n\
+                 output = { picture = false, gltf = false }\n\
+                 fabric = { density = 0.15, material.stvk = { stretch_stiffness = 50.0, poisson_ratio = 0.3 } }\n";
+    write("scene.toml", scene);
+    write("values.toml", "fabric.density = [0.1]");
+    let index = |height: f64, output: &str| {
+        write("tent.obj", &format!("v 0 0 {height}\nv 1 0 0\nv 0 1 0\nv 1 1 0\nf 1 2 3\nf 2 4 3\n"));
+        succeeds(&["sweep", "scene.toml", "values.toml", "-o", output], folder.path());
+        read(&folder.path().join(output), "index.csv")
+    };
+    let first = index(0.3, "runs");
+    let second = index(0.6, "runs");
+    assert_ne!(first, second);
+    assert_eq!(second, index(0.6, "fresh"));
+    assert_eq!(first, index(0.3, "runs"), "the first mesh has its results still");
+}

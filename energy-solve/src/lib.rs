@@ -57,7 +57,7 @@ mod system;
 mod terms;
 pub mod threads;
 
-pub use contact::{Contact, ContactCounts, ContactMemory, ContactModel, ContactsInMatrix, Pressed, Presser};
+pub use contact::{Contact, ContactCounts, ContactMemory, ContactModel, ContactsInMatrix, Pressed, Presser, Touching};
 pub use least_squares::{
     CouplingError, Couplings, GaussNewton, GaussNewtonError, GaussNewtonOptions, IterationReport, LeastSquaresTerm,
     Loss, NormalEquations, NormalMatrix, NormalPattern, NormalSolution, NormalSolver, NormalSolverKind, Outcome,
@@ -71,6 +71,7 @@ pub use matrix::{BlockMatrix, Blocks, Bsr, Csr, DofMap, Pattern, Precision, Stor
 pub use system::{EvaluationError, LinearisationOptions, LinearisedForces, System, SystemError, TermEnergy};
 pub use terms::{
     BlockPlaces, Character, Counts, Curvature, DissipationLaw, DissipationTerm, Divisible, DrivenLaw, DrivenTerm,
-    ElementList, ForceTerm, Linearisation, ListError, PlacedTerm, PotentialTerm, Quantity, Restriction, Share, State,
-    Stencils, StepStart, Tally, TapeTerm, Term, TermDescription, TriangleBuffer, Weights, change_dense,
+    ElementList, ForceTerm, Linearisation, ListError, Order, OwnLaw, OwnResults, OwnTerm, PlacedTerm, PotentialTerm,
+    Quantity, Restriction, Share, State, SteeredTapeTerm, SteeredTapes, Stencils, StepStart, Tally, TapeTerm, Term,
+    TermDescription, TriangleBuffer, Weights, change_dense,
 };

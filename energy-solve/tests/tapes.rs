@@ -6,7 +6,8 @@ use energy_dsl::tape::Column;
 use energy_dsl::{Block, Element, PackedPotential, Vector3};
 use energy_elements::{Gravity, QuadraticHinge, StVK, ZeroLengthSpring};
 use energy_solve::{
-    Counts, Curvature, ElementList, LinearisationOptions, PotentialTerm, State, System, TapeTerm, Term, Weights,
+    Character, Counts, Curvature, ElementList, LinearisationOptions, Order, OwnLaw, OwnResults, OwnTerm, PotentialTerm,
+    State, SteeredTapeTerm, SteeredTapes, Storage, System, TapeTerm, Term, Weights,
 };
 
 /// Cells per side: enough vertices for three threads.
@@ -147,5 +148,94 @@ fn restricted_terms_that_are_read_have_the_bits_of_compiled_ones() {
         assert!(one == read, "{threads} threads, {curvature:?}");
         let evaluated = |sums: &Sums| sums.counts[0].hessian.evaluated;
         assert!(evaluated(&read) < evaluated(&self::sums(true, 1, curvature, false)));
+    }
+}
+
+/// Zero-length springs, evaluated by a function of the caller.
+#[derive(Debug)]
+struct OwnSprings(Vec<f64>);
+
+impl OwnLaw for OwnSprings {
+    fn declaration(&self) -> &'static energy_dsl::Declaration {
+        <ZeroLengthSpring as Element>::DECLARATION
+    }
+
+    fn points(&self) -> usize {
+        2
+    }
+
+    fn character(&self) -> Character {
+        Character { symmetric: true, velocity_dependent: false, quadratic: true, curved: true }
+    }
+
+    fn has_energy(&self) -> bool {
+        true
+    }
+
+    fn evaluate(&self, order: Order, x: &[f64], _v: &[f64], results: &mut OwnResults) {
+        for (element, (k, x)) in self.0.iter().zip(x.chunks_exact(6)).enumerate() {
+            for axis in 0..3 {
+                let d = x[axis] - x[3 + axis];
+                results.energies[element] += 0.5 * k * d * d;
+                if order >= Order::Force {
+                    results.forces[6 * element + axis] = -k * d;
+                    results.forces[6 * element + 3 + axis] = k * d;
+                }
+                if order == Order::Jacobians {
+                    for (i, j) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
+                        let place = 36 * element + 6 * (3 * i + axis) + 3 * j + axis;
+                        results.by_position[place] = if i == j { -k } else { *k };
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// The sum of a term over five vertices, the second of them pinned: energy, force, and the whole matrix.
+fn summed(term: Box<dyn Term>, curvature: Curvature) -> (f64, Vec<Vector3<f64>>, Vec<(usize, usize, f64)>) {
+    let x: Vec<Vector3<f64>> = (0..5).map(|i| [0.3 * f64::from(i), f64::from(i * i), 0.1]).collect();
+    let v = vec![[0.0; 3]; 5];
+    let mut system = System::new(vec![term], &[false, true, false, false, false]).unwrap();
+    let mut matrix = system.matrix();
+    let weights = Weights { position: -1.0, velocity: 0.0 };
+    let options = LinearisationOptions { weights, curvature, stiffness_times_velocity: false };
+    let force = system.linearise(State { x: &x, v: &v }, options, &mut matrix).unwrap().force;
+    let energy = system.energies(&x).unwrap()[0].energy.unwrap();
+    (energy, force, matrix.to_triplets(Storage::Whole))
+}
+
+#[test]
+fn own_laws_and_steered_tapes_sum_as_declared_elements_do() {
+    let stencils: [[usize; 2]; 4] = [[0, 1], [1, 2], [2, 4], [4, 0]];
+    let vertices: Vec<u32> = stencils.concat().iter().map(|&vertex| vertex as u32).collect();
+    let stiffness = vec![1.0, 2.0, 3.0, 4.0];
+    let list = |stiffness: &[f64]| {
+        let springs = stiffness.iter().map(|&k| ZeroLengthSpring::new(k, 0.0)).collect();
+        Box::new(PotentialTerm::new(ElementList::new("springs", springs, &stencils).unwrap()))
+    };
+    let own = OwnTerm::new("own".to_owned(), OwnSprings(stiffness.clone()), vertices);
+    let text = "energy S(p, q: Point; k: Scalar) { k / 2 * norm_squared(p - q) }";
+    let element = Interpreted::from_source(text).unwrap().remove(0);
+    let bound = |stiffness: &[f64]| element.elements(4, &[], &[Column::Each(stiffness)]).unwrap().tape().clone();
+    let tapes = SteeredTapes::new(bound(&[9.0; 4]));
+    let vertices = stencils.concat();
+    let steered = SteeredTapeTerm::new("steered".to_owned(), element.declaration(), tapes.clone(), vertices);
+    let expected = summed(list(&stiffness), Curvature::Clamped);
+    // New parameters reach a term that is placed after the change at once, and others at the start of a step.
+    tapes.replace(bound(&stiffness));
+    for (found, name) in
+        [(summed(Box::new(own), Curvature::Clamped), "own"), (summed(Box::new(steered), Curvature::Clamped), "steered")]
+    {
+        let close = |a: f64, b: f64| (a - b).abs() < 1e-12 * (1.0 + b.abs());
+        assert!(close(found.0, expected.0), "{name}: {} J", found.0);
+        let free = [0, 2, 3, 4];
+        assert!(free.iter().all(|&i| (0..3).all(|a| close(found.1[i][a], expected.1[i][a]))), "{name}");
+        let entry =
+            |list: &[(usize, usize, f64)], at| list.iter().filter(|e| (e.0, e.1) == at).map(|e| e.2).sum::<f64>();
+        for &(row, column, _) in expected.2.iter().chain(&found.2) {
+            let at = (row, column);
+            assert!(close(entry(&found.2, at), entry(&expected.2, at)), "{name} at {at:?}");
+        }
     }
 }

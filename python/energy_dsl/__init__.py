@@ -13,19 +13,17 @@ Arrays hold one element per row: positions have the shape (n, points, 3), gradie
 from __future__ import annotations
 
 import functools as _functools
-import json as _json
 import os as _os
-from pathlib import Path as _Path
+from collections.abc import Callable as _Callable, Iterable as _Iterable, Mapping as _Mapping
+from typing import TYPE_CHECKING, Any as _Any, NamedTuple as _NamedTuple
 
-from collections.abc import Callable as _Callable, Mapping as _Mapping
-from typing import TYPE_CHECKING, Any as _Any
-
-from ._energy import Element, Elements, EnergyError, FolderInUseError, Input, Simulation as _Simulation
-from ._energy import System as _System, audit as _audit, catalogue, energies, library_element as _library_element
-from ._energy import resume as _resume, run as _run, show
-from .sweep import Sweep, sweep
+from ._energy import Element, Elements, EnergyError, FolderInUseError, Input, ResourceError, Simulation as _Simulation
+from ._energy import Snapshot, System as _System, audit as _audit, catalogue, energies
+from ._energy import library_element as _library_element, resume as _resume, run as _run, show
 
 if TYPE_CHECKING:
+    from .sweeps import Sweep, sweep
+
     import numpy as _np
     from numpy.typing import ArrayLike as _ArrayLike, NDArray as _NDArray
     from typing_extensions import Self as _Self
@@ -35,9 +33,24 @@ if TYPE_CHECKING:
     _Progress = _Callable[[int, int], object]
 
 __all__ = [
-    "AuditReport", "Element", "Elements", "EnergyError", "FolderInUseError", "Input", "Simulation", "Sweep", "System",
-    "audit", "catalogue", "element", "energies", "energy", "load", "resume", "run", "show", "simulate", "sweep",
+    "AuditReport", "Contacts", "Element", "Elements", "EnergyError", "FolderInUseError", "Input", "Minimum",
+    "OwnEnergy", "OwnForce", "ResourceError", "Simulation", "Snapshot", "Sweep", "System", "audit", "catalogue",
+    "element", "energies", "energy", "load", "resume", "run", "show", "simulate", "sweep",
 ]
+
+
+def __getattr__(name: str) -> _Any:
+    """Imports sweeps when they are first used: their executors take longer to import than the rest."""
+    if name in ("Sweep", "sweep"):
+        from . import sweeps
+
+        globals().update(Sweep=sweeps.Sweep, sweep=sweeps.sweep)
+        return globals()[name]
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})
 
 
 def energy(text: str, file: str = "<text>") -> Element:
@@ -53,8 +66,8 @@ def energy(text: str, file: str = "<text>") -> Element:
 
 def load(path: str | _os.PathLike[str]) -> list[Element]:
     """Compiles all declarations of a file (`.energy`)."""
-    path = _Path(path)
-    return energies(path.read_text(encoding="utf-8"), str(path))
+    with open(path, encoding="utf-8") as file:
+        return energies(file.read(), _os.fspath(path))
 
 
 @_functools.cache
@@ -91,51 +104,288 @@ class AuditReport:
 
 def audit(text: str, *, quick: bool = False, seed: int = 1, file: str = "<text>") -> AuditReport:
     """Compares all derivatives of a text with independent methods, and checks its claims, as `verify audit` does."""
+    import json
+
     passed, report, failures = _audit(text, quick=quick, seed=seed, file=file)
-    return AuditReport(passed, _json.loads(report), failures)
+    return AuditReport(passed, json.loads(report), failures)
+
+
+class Minimum(_NamedTuple):
+    """Where `System.minimise` ended."""
+
+    #: Positions, (vertices, 3).
+    x: _NDArray[_np.float64]
+    #: U, in J.
+    energy: float
+    #: The largest component of the gradient at a free vertex, in N.
+    gradient: float
+    #: Steps of Newton's method.
+    iterations: int
+    #: Whether `gradient` is within the tolerance.
+    converged: bool
 
 
 class System(_System):
-    """A sum of energies over the vertices of a mesh.
+    """A sum of energies, forces and residuals over the vertices of a mesh.
 
-    `vertices` is their number. Those in `pinned` have no rows in the matrix. `add(element, stencils, **inputs)` adds
-    an element for each row of stencils.
+    `vertices` is their number. Those in `pinned` have no rows in the matrix. `masses` (kg), of shape (vertices,), count
+    where a method has a factor `mass`.
+
+    `add(element, stencils, **inputs)` adds an element for each row of stencils, and returns the number of the term. A
+    residual whose unknowns are the coordinates of vertices adds ½ ‖r‖², with the Hessian JᵀJ of Gauss and Newton.
+    `set(term, **inputs)` changes inputs later. `pinned`, `masses` and `threads` can be assigned at any time.
+
+    `flags(x)` tells which elements are degenerate or outside of their formula's domain, where `energy` is infinite.
     """
 
-    def linearise(self, x: _ArrayLike, curvature: str = "exact") -> tuple[float, _NDArray[_np.float64], _Any]:
+    def linearise(
+        self, x: _ArrayLike, curvature: str = "exact", *, half: bool = False
+    ) -> tuple[float, _NDArray[_np.float64], _Any]:
         """Returns U (J), ∂U/∂x, and ∂²U/∂x² of the free vertices as a scipy.sparse.bsr_array.
 
         Elements whose vertices are all pinned are left out: they are constant.
         With `curvature` "clamped" or "absolute", element Hessians are made positive semi-definite first. The pattern
-        of the matrix stays the same from call to call.
+        of the matrix stays the same from call to call. With `half`, blocks below the diagonal are left out.
 
         Raises RuntimeError, which names the element, if one is outside of its formula's domain, such as an inverted
         triangle with a logarithm of its area. `energy` returns infinity there, so that a line search steps back.
+        Raises TypeError if the system has a force, which has no energy.
         """
+        U, gradient, blocks = self.linearise_blocks(x, curvature, half)
+        return U, gradient, self._matrix(blocks)
+
+    def linearise_forces(
+        self,
+        x: _ArrayLike,
+        v: _ArrayLike | None = None,
+        *,
+        position: float = -1.0,
+        velocity: float = 0.0,
+        mass: float = 0.0,
+        curvature: str = "exact",
+        half: bool = False,
+    ) -> tuple[_NDArray[_np.float64], _Any]:
+        """Returns f (N), of shape (vertices, 3), and the matrix position ∂f/∂x + velocity ∂f/∂v + mass M of the free
+        vertices as a scipy.sparse.bsr_array.
+
+        Energies act with f = −∂U/∂x. Velocities are 0 by default. A step of implicit Euler with step size h solves
+        (M − h² ∂f/∂x − h ∂f/∂v) Δv = h (f + h ∂f/∂x v): position=−h², velocity=−h, mass=1.
+        """
+        force, blocks = self.linearise_forces_blocks(
+            x, v, position=position, velocity=velocity, mass=mass, curvature=curvature, half=half
+        )
+        return force, self._matrix(blocks)
+
+    def _matrix(self, blocks: tuple[_Any, _Any, _Any]) -> _Any:
         from scipy.sparse import bsr_array
 
-        U, gradient, (offsets, columns, blocks) = self.linearise_blocks(x, curvature)
+        offsets, columns, numbers = blocks
         size = 3 * len(self.free)
-        return U, gradient, bsr_array((blocks, columns, offsets), shape=(size, size))
+        return bsr_array((numbers, columns, offsets), shape=(size, size))
+
+    def minimise(
+        self,
+        x: _ArrayLike,
+        *,
+        tolerance: float = 1e-9,
+        iterations: int = 100,
+        mass: float = 0.0,
+        target: _ArrayLike | None = None,
+    ) -> Minimum:
+        """Minimises U(x) + mass/2 Σ mᵢ ‖xᵢ − targetᵢ‖² over the free vertices.
+
+        Newton's method with sparse Cholesky factors and a line search; Hessians are exact where their sum is positive
+        definite, elsewhere those of elements are clamped. It ends where no component of the gradient exceeds
+        `tolerance` (N), or after `iterations` steps; `converged` tells. A step of implicit Euler from positions x with
+        velocities v and step size h has target = x + h v and mass = 1/h².
+
+        Raises RuntimeError if x is outside of a formula's domain, TypeError if the system has a force.
+        """
+        return Minimum(
+            *self.minimise_energy(x, tolerance=tolerance, iterations=iterations, mass=mass, target=target)
+        )
+
+    def __reduce__(self) -> tuple[_Any, ...]:
+        arguments = (self.vertices, self.pinned, self.masses)
+        return _system, (type(self), arguments, self.threads, self._terms(), self.__dict__)
+
+
+def _system(cls: type[System], arguments: tuple[_Any, ...], threads: int, terms: list[_Any], more: _Any) -> System:
+    """Makes a system from a pickle."""
+    system = cls.__new__(cls, *arguments)
+    system.threads = threads
+    for element, stencils, inputs in terms:
+        system.add(element, stencils, **inputs)
+    system.__dict__.update(more)
+    return system
+
+
+@_functools.lru_cache(maxsize=1024)
+def _declared(text: str, file: str, number: int) -> Element:
+    """Makes an element from a pickle. Workers that get one element many times compile it once."""
+    return energies(text, file)[number]
+
+
+def _bound(element: Element, count: int, dtype: str, threads: int, inputs: dict[str, _Any]) -> Elements:
+    """Binds elements from a pickle."""
+    return element.bind(count, dtype, threads=threads, **inputs)
 
 
 def _scene(scene: _Scene) -> tuple[str, str]:
     """Returns the text of a scene, and the path at which relative paths start."""
     if isinstance(scene, _Mapping):
-        return _json.dumps(scene), "scene.toml"
-    path = _Path(scene)
-    return path.read_text(encoding="utf-8"), str(path)
+        import json
+
+        from .plain import plain
+
+        return json.dumps(scene, default=plain), "scene.toml"
+    with open(scene, encoding="utf-8") as file:
+        return file.read(), _os.fspath(scene)
+
+
+class OwnEnergy:
+    """An energy of a simulation that a function evaluates, for all elements at once.
+
+    `function(x, order)` gets positions (n, points, 3), and returns U of shape (n,) for order 0; U and ∂U/∂x of shape
+    (n, points, 3) for order 1; U, ∂U/∂x and ∂²U/∂x² of shape (n, 3 points, 3 points) for order 2. With
+    `hessians=False`, order 2 is not asked for, and integrators see no stiffness: good for weak pulls only.
+    `stencils`, of shape (n, points), names the vertices.
+    """
+
+    is_energy = True
+
+    def __init__(self, function: _Callable[..., _Any], stencils: _ArrayLike, *, hessians: bool = True) -> None:
+        if not callable(function):
+            raise TypeError(f"OwnEnergy: expected a function, got {type(function).__name__}")
+        self.function, self.stencils, self.jacobians = function, stencils, hessians
+
+
+class OwnForce:
+    """A force of a simulation that a function evaluates, for all elements at once.
+
+    `function(x, v, order)` gets positions and velocities (n, points, 3), and returns f of the same shape for order 1.
+    It is called once in each step, with the state at its start, and the force stays fixed over the step. So it suits
+    every integrator, if the force changes little within a step.
+
+    With `jacobians=True`, implicit integrators evaluate it at the end of a step, several times. It then returns f,
+    ∂f/∂x and ∂f/∂v, both of shape (n, 3 points, 3 points), for order 2. `newton` refuses such a force: it has no energy.
+    """
+
+    is_energy = False
+
+    def __init__(self, function: _Callable[..., _Any], stencils: _ArrayLike, *, jacobians: bool = False) -> None:
+        if not callable(function):
+            raise TypeError(f"OwnForce: expected a function, got {type(function).__name__}")
+        self.function, self.stencils, self.jacobians = function, stencils, jacobians
+
+
+class Contacts(_NamedTuple):
+    """Pairs of features in certified contact: a point and a triangle, or two edges."""
+
+    #: Vertices of the first feature, then of the second, (n, 4); -1 for those of obstacles.
+    vertices: _NDArray[_np.int64]
+    #: Number of vertices of the first feature, (n,): 1 for a point and a triangle, 2 for two edges.
+    first: _NDArray[_np.int64]
+    #: Distances of the features, in m, (n,).
+    distances: _NDArray[_np.float64]
+    #: Unit vectors from the second feature to the first, (n, 3).
+    normals: _NDArray[_np.float64]
+    #: Pushes along the normals, in N, without friction, (n,).
+    forces: _NDArray[_np.float64]
 
 
 class Simulation(_Simulation):
     """A scene of cloth, stepped by hand: a path of a TOML file, or a dictionary with the same keys.
 
-    `step` releases the interpreter's lock. A second thread that uses the same object meanwhile gets a RuntimeError.
+    A program may control it between steps:
+
+    - `positions` and `velocities` can be read and assigned;
+    - `move_pins(vertices, targets)` sets where pinned vertices are at the end of the next step;
+    - `move_obstacle(name, translation, rotation)` moves the obstacles that `obstacles` names;
+    - `wind` can be assigned with `wind=True`, if the scene has a wind;
+    - `forces` are own forces and energies by name: (element, stencils, inputs) of a text, whose inputs `set(name, …)`
+      changes, or functions: OwnEnergy, OwnForce;
+    - `snapshot()` and `restore(snapshot)` go back with the same bits; `reset()` goes back to the start, without
+      building anything;
+    - `term_forces()` (of the elements that have a free vertex), `contact_forces`, `contacts()` and, after
+      `keep_ledger()`, `ledger()` are arrays.
+
+    `step` releases the interpreter's lock. A second thread that uses the same object meanwhile gets a RuntimeError. An
+    exception of an own function ends the step, and leaves the state before it.
     """
 
-    def __new__(cls, scene: _Scene, threads: int | None = None) -> _Self:
+    def __new__(
+        cls,
+        scene: _Scene,
+        threads: int | None = None,
+        *,
+        obstacles: _Iterable[str] = (),
+        wind: bool = False,
+        forces: _Mapping[str, tuple[Element, _Any, _Mapping[str, _Any]] | OwnEnergy | OwnForce] | None = None,
+    ) -> _Self:
         text, path = _scene(scene)
-        return super().__new__(cls, text, path, threads)
+        return cls._made(text, path, threads, list(obstacles), wind, dict(forces or {}))
+
+    @classmethod
+    def _made(
+        cls, text: str, path: str, threads: int | None, obstacles: list[str], wind: bool, forces: dict[str, _Any]
+    ) -> _Self:
+        texts, functions = [], []
+        for name, force in forces.items():
+            if isinstance(force, (OwnEnergy, OwnForce)):
+                functions.append((name, force.function, force.stencils, force.is_energy, force.jacobians))
+            elif isinstance(force, tuple) and len(force) == 3 and isinstance(force[0], Element):
+                texts.append((name, force[0], force[1], dict(force[2])))
+            else:
+                expected = "(element, stencils, inputs), OwnEnergy or OwnForce"
+                raise TypeError(f"forces, {name}: expected {expected}, got {type(force).__name__}")
+        self = super().__new__(cls, text, path, threads, obstacles, wind, texts, functions)
+        self._recipe = (text, _os.path.abspath(path), threads, obstacles, wind, forces)
+        self._start = None
+        return self
+
+    _recipe: tuple[_Any, ...]
+    _start: Snapshot | None
+
+    def step(self, steps: int = 1) -> int:
+        """Takes steps, at most to the end of the scene. Returns the number taken."""
+        if self._start is None:
+            self._start = self.snapshot()
+        return super().step(steps)
+
+    def reset(self) -> None:
+        """Goes back to the state before the first step, own parameters included."""
+        if self._start is not None:
+            self.restore(self._start)
+
+    def contacts(self) -> Contacts:
+        """Returns the pairs in certified contact at the end of the last step."""
+        return Contacts(*self.contact_pairs())
+
+    def ledger(self) -> dict[str, _NDArray[_np.float64]]:
+        """Returns the energy balance so far: `time` (s), then energies and works (J), one number for each step.
+
+        Raises RuntimeError unless `keep_ledger` was called.
+        """
+        columns = self.ledger_columns()
+        if columns is None:
+            raise RuntimeError("no ledger is kept; call keep_ledger() before the first step")
+        return dict(columns)
+
+    def __reduce__(self) -> tuple[_Any, ...]:
+        own = {name: value for name, value in self.__dict__.items() if name not in ("_recipe", "_start")}
+        return _simulation, (type(self), self._recipe, self.snapshot(), self._start, own)
+
+
+def _simulation(
+    cls: type[Simulation], recipe: tuple[_Any, ...], now: Snapshot, start: Snapshot | None, more: dict[str, _Any]
+) -> Simulation:
+    """Makes a simulation from a pickle."""
+    simulation = cls._made(*recipe)
+    simulation.restore(now)
+    simulation._start = start
+    simulation.__dict__.update(more)
+    return simulation
 
 
 def simulate(

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import csv
 import html
+import io
 import json
 from pathlib import Path
 from typing import Any
+
+from .sweep_files import replace
 
 #: Columns of the index after those of the parameters.
 RESULTS = [
@@ -25,12 +28,11 @@ def write_index(folder: Path, names: list[str], runs: list[dict[str, Any]], seco
 
 
 def _write_rows(path: Path, columns: list[str], rows: list[dict[str, Any]]) -> None:
-    part = path.with_suffix(".part")
-    with part.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, columns, lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(rows)
-    part.replace(path)
+    text = io.StringIO(newline="")
+    writer = csv.DictWriter(text, columns, lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(rows)
+    replace(path, text.getvalue())
 
 
 def write_parquet(path: Path, names: list[str], runs: list[dict[str, Any]]) -> None:
@@ -67,7 +69,8 @@ def write_page(path: Path, names: list[str], runs: list[dict[str, Any]], seconds
     head = "".join(f"<th>{html.escape(name.replace('_', ' '))}</th>" for name in columns)
     body = "\n".join(_row(columns, run, time) for run, time in zip(runs, seconds))
     slowest = max(seconds, default=0.0)
-    path.write_text(
+    replace(
+        path,
         f"""<!doctype html>
 <html lang="en">
 <meta charset="utf-8">
@@ -81,7 +84,6 @@ def write_page(path: Path, names: list[str], runs: list[dict[str, Any]], seconds
 </table>
 </html>
 """,
-        encoding="utf-8",
     )
 
 

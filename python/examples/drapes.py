@@ -2,6 +2,7 @@
 
 import sys
 from concurrent.futures import ProcessPoolExecutor
+from typing import Any
 
 import energy_dsl as ed
 
@@ -16,7 +17,7 @@ scene = {
 
 if __name__ == "__main__":
     folder = sys.argv[1] if len(sys.argv) > 1 else "drapes"
-    grid = {"fabric.density": [0.1, 0.2, 0.3], "mesh.sheet.cells": [[8, 8], [16, 16]]}
+    grid: dict[str, list[Any]] = {"fabric.density": [0.1, 0.2, 0.3], "mesh.sheet.cells": [[8, 8], [16, 16]]}
     with ProcessPoolExecutor(2) as pool:
         sweep = ed.sweep(scene, grid, folder, executor=pool)
     print(f"{len(sweep.runs)} runs, {len(sweep.failures)} failed; see {sweep.folder / 'index.csv'}")

@@ -16,6 +16,13 @@ create_exception!(
     "The output folder belongs to another process that still runs."
 );
 
+create_exception!(
+    energy_dsl,
+    ResourceError,
+    PyRuntimeError,
+    "A run that the machine prevents, not its scene: a file cannot be written, or memory is short."
+);
+
 /// Turns any error into a `ValueError` of the package.
 pub fn wrong(error: impl std::fmt::Display) -> PyErr {
     EnergyError::new_err(error.to_string())
@@ -23,6 +30,11 @@ pub fn wrong(error: impl std::fmt::Display) -> PyErr {
 
 /// Turns any error, with its causes, into a `RuntimeError`.
 pub fn failed(error: impl std::error::Error) -> PyErr {
+    PyRuntimeError::new_err(with_causes(&error))
+}
+
+/// Returns the message of an error, followed by those of its causes.
+pub fn with_causes(error: &dyn std::error::Error) -> String {
     let mut message = error.to_string();
     let mut source = error.source();
     while let Some(cause) = source {
@@ -32,5 +44,5 @@ pub fn failed(error: impl std::error::Error) -> PyErr {
         }
         source = cause.source();
     }
-    PyRuntimeError::new_err(message)
+    message
 }

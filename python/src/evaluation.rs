@@ -1,14 +1,17 @@
 //! Elements with bound inputs, evaluated in batches.
 
+use std::ops::Range;
+
 use energy_catalogue::{BatchRoutine, CompiledBatch};
 use energy_compiler::{Elements as Tapes, EvaluateError, InputKind, Interpreted};
 use energy_dsl::Flagged;
+use energy_dsl::tape::TAPE_BLOCK;
 use numpy::{PyArray1, PyUntypedArrayMethods};
 use pyo3::prelude::*;
-use pyo3::types::PyTuple;
+use pyo3::types::{PyDict, PyTuple};
 
 use crate::arrays::{Precision, Shape, Slot, array, numbers, outputs, tuple, writable, wrong_shape};
-use crate::element::{Element, count};
+use crate::element::{Element, Origin, count};
 use crate::errors::wrong;
 
 /// Results that are written without releasing the interpreter's lock: releasing it takes longer.
@@ -18,7 +21,9 @@ const FEW: usize = 2000;
 #[pyclass(frozen, module = "energy_dsl")]
 pub struct Elements {
     batch: AnyBatch,
-    is_of_library: bool,
+    origin: Origin,
+    /// Copies of the inputs that were bound, for pickles; `None` for elements that no user holds.
+    inputs: Option<Py<PyDict>>,
 }
 
 enum AnyBatch {
@@ -45,7 +50,7 @@ impl Elements {
     #[getter]
     fn element(&self) -> Element {
         let inner = any!(self, batch => batch.tapes.element()).clone();
-        Element::new(inner, self.is_of_library)
+        Element::new(inner, self.origin.clone())
     }
 
     /// Name of the dtype that elements are evaluated in.
@@ -58,7 +63,30 @@ impl Elements {
     /// bits.
     #[getter]
     fn is_compiled(&self) -> bool {
-        any!(self, batch => batch.compiled.is_some())
+        any!(self, batch => batch.parts.iter().all(|part| part.compiled.is_some()))
+    }
+
+    /// The most threads of one call.
+    #[getter]
+    fn threads(&self) -> usize {
+        any!(self, batch => batch.threads)
+    }
+
+    /// Pickles hold the element and the inputs that were bound.
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyTuple>)> {
+        let bound = py.import("energy_dsl")?.getattr("_bound")?;
+        let inputs = self.inputs.as_ref().map_or_else(|| PyDict::new(py), |inputs| inputs.bind(py).clone());
+        let arguments = (self.element(), self.__len__(), self.dtype(), self.threads(), inputs);
+        Ok((bound, arguments.into_pyobject(py)?))
+    }
+
+    /// Bound elements do not change, so copies are the same object.
+    fn __copy__(slf: Py<Self>) -> Py<Self> {
+        slf
+    }
+
+    fn __deepcopy__(slf: Py<Self>, _memo: &Bound<'_, PyAny>) -> Py<Self> {
+        slf
     }
 
     fn __repr__(&self) -> String {
@@ -67,12 +95,17 @@ impl Elements {
 }
 
 impl Elements {
-    pub fn double(batch: Batch<f64>, is_of_library: bool) -> Self {
-        Self { batch: AnyBatch::Double(batch), is_of_library }
+    pub fn double(batch: Batch<f64>, origin: Origin) -> Self {
+        Self { batch: AnyBatch::Double(batch), origin, inputs: None }
     }
 
-    pub fn single(batch: Batch<f32>, is_of_library: bool) -> Self {
-        Self { batch: AnyBatch::Single(batch), is_of_library }
+    pub fn single(batch: Batch<f32>, origin: Origin) -> Self {
+        Self { batch: AnyBatch::Single(batch), origin, inputs: None }
+    }
+
+    /// Keeps copies of the inputs, for pickles.
+    pub fn with_inputs(self, inputs: Py<PyDict>) -> Self {
+        Self { inputs: Some(inputs), ..self }
     }
 
     pub fn evaluate<'py>(&self, request: &Request<'_, 'py>) -> PyResult<Bound<'py, PyAny>> {
@@ -95,17 +128,33 @@ pub struct Request<'a, 'py> {
 /// Bound elements of one precision.
 pub struct Batch<S> {
     tapes: Tapes<S>,
-    compiled: Option<Box<dyn CompiledBatch<S>>>,
+    /// Each is evaluated by one thread.
+    parts: Vec<Part<S>>,
+    threads: usize,
     sizes: Sizes,
+}
+
+/// Elements that one thread evaluates.
+struct Part<S> {
+    range: Range<usize>,
+    compiled: Option<Box<dyn CompiledBatch<S>>>,
 }
 
 impl<S: Precision> Batch<S> {
     /// Elements of the library are compiled code where it exists for the routine, else tapes.
-    pub fn new(tapes: Tapes<S>, is_of_library: bool) -> Self {
+    pub fn new(tapes: Tapes<S>, is_of_library: bool, threads: usize) -> Self {
         let (sizes, name) = (Sizes::of(tapes.element(), tapes.len()), tapes.element().declaration().name);
-        let numbers = |element| tapes.tape().numbers_of(element);
-        let compiled = if is_of_library { energy_catalogue::bind(name, tapes.len(), numbers) } else { None };
-        Self { tapes, compiled, sizes }
+        // Tapes run over whole blocks.
+        let size = tapes.len().div_ceil(TAPE_BLOCK).div_ceil(threads).max(1) * TAPE_BLOCK;
+        let starts = (0..tapes.len().max(1)).step_by(size);
+        let part = |start: usize| {
+            let range = start..tapes.len().min(start + size);
+            let numbers = |element: usize| tapes.tape().numbers_of(range.start + element);
+            let compiled = if is_of_library { energy_catalogue::bind(name, range.len(), numbers) } else { None };
+            Part { range, compiled }
+        };
+        let parts = starts.map(part).collect();
+        Self { tapes, parts, threads, sizes }
     }
 
     fn dtype(&self) -> &'static str {
@@ -157,10 +206,50 @@ impl<S: Precision> Batch<S> {
         v: &[S],
         results: &mut [&mut [S]],
     ) -> Result<Flagged, EvaluateError> {
-        if let Some(result) = self.compiled.as_ref().and_then(|batch| batch.evaluate(routine, x, v, results)) {
-            return Ok(result?);
+        if let [part] = &self.parts[..] {
+            return self.write_part(part, routine, x, v, results);
         }
-        let (all, tapes) = (0..self.tapes.len(), &self.tapes);
+        let count = self.tapes.len();
+        let mut rest: Vec<&mut [S]> = results.iter_mut().map(|result| &mut **result).collect();
+        let found: Vec<_> = std::thread::scope(|scope| {
+            let mut running = Vec::with_capacity(self.parts.len());
+            for part in &self.parts {
+                let Range { start, end } = part.range;
+                let of = |numbers: &'_ [S]| numbers.len() / count;
+                let (x, v) = (&x[start * of(x)..end * of(x)], &v[start * of(v)..end * of(v)]);
+                let mut own = Vec::with_capacity(rest.len());
+                let mut others = Vec::with_capacity(rest.len());
+                for numbers in rest {
+                    let size = numbers.len() / (count - start) * (end - start);
+                    let (head, tail) = numbers.split_at_mut(size);
+                    own.push(head);
+                    others.push(tail);
+                }
+                rest = others;
+                running.push(scope.spawn(move || self.write_part(part, routine, x, v, &mut own)));
+            }
+            let join = |thread: std::thread::ScopedJoinHandle<'_, _>| thread.join().expect("elements do not panic");
+            running.into_iter().map(join).collect()
+        });
+        let lists: Vec<Flagged> = found.into_iter().collect::<Result<_, _>>()?;
+        Ok(lists.concat())
+    }
+
+    /// Writes the results of a part, to slices of it alone. Indices of flagged elements count from the first of all.
+    fn write_part(
+        &self,
+        part: &Part<S>,
+        routine: BatchRoutine,
+        x: &[S],
+        v: &[S],
+        results: &mut [&mut [S]],
+    ) -> Result<Flagged, EvaluateError> {
+        if let Some(result) = part.compiled.as_ref().and_then(|batch| batch.evaluate(routine, x, v, results)) {
+            let mut flagged = result?;
+            flagged.iter_mut().for_each(|(element, _)| *element += part.range.start);
+            return Ok(flagged);
+        }
+        let (all, tapes) = (part.range.clone(), &self.tapes);
         match (routine, results) {
             (BatchRoutine::Value, [u]) => tapes.values(all, x, u),
             (BatchRoutine::Gradient, [u, g]) => tapes.gradients(all, x, u, g),

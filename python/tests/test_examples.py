@@ -4,6 +4,7 @@ import json
 import runpy
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
@@ -27,3 +28,24 @@ def test_the_notebook_runs(monkeypatch):
             lines = "".join(cell["source"]).splitlines()
             exec("\n".join(line for line in lines if not line.startswith("%")), names)
     assert names["residuals"][-1] < 1e-9 and not names["sweep"].failures
+
+
+def test_a_towel_is_folded():
+    example = runpy.run_path(str(EXAMPLES / "folding.py"))
+    simulation = example["folded"](cells=4, carrying=60)
+    width = np.ptp(simulation.positions[:, 0])
+    assert width < 0.8 * example["SIDE"], width
+
+
+def test_environments_start_again_with_the_same_bits():
+    example = runpy.run_path(str(EXAMPLES / "towel_env.py"))
+    example["SCENE"]["mesh"]["sheet"]["cells"] = [8, 8]
+    env, other = example["TowelEnv"](), example["TowelEnv"]()
+    action = np.full((2, 3), 0.5)
+    results = []
+    for one in (env, env, other):
+        first, _ = one.reset()
+        seen, reward, terminated, truncated, info = one.step(action)
+        assert seen.shape == first.shape == (2, 32, 3) and reward < 0 and not terminated and not truncated
+        results.append((seen.tobytes(), reward))
+    assert results[0] == results[1] == results[2]

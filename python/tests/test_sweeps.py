@@ -20,6 +20,7 @@ SCENE = {
     "mesh": {"sheet": {"cells": [4, 4], "size": [1.0, 1.0]}},
     "fabric": {"density": 0.15, "material": {"stvk": {"stretch_stiffness": 50.0, "poisson_ratio": 0.3}}},
     "pins": [{"nearest": [-0.5, 0.5, 0.0]}],
+    "output": {"size": [120, 100]},
 }
 GRID = {"fabric.density": [0.1, 0.2], "dt": [0.01, 0.02]}
 

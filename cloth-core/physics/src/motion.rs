@@ -1,5 +1,7 @@
 //! Rigid motions over time, from keyframes.
 
+use std::sync::{Arc, PoisonError, RwLock};
+
 use schemars::JsonSchema;
 use serde::Deserialize;
 
@@ -32,6 +34,9 @@ pub struct Motion {
     #[serde(deserialize_with = "keys")]
     #[schemars(length(min = 1))]
     pub keys: Vec<Key>,
+    /// Poses that a program sets while a simulation runs, in place of the keys; `None` for the motion of the keys.
+    #[serde(skip)]
+    pub steering: Option<Steering>,
     /// Motion between keys: `linear` (the default), `smoothstep`, which stops at every key, or `cubic`, which passes
     /// through keys with a continuous velocity and without overshoot.
     #[serde(default)]
@@ -56,7 +61,7 @@ impl Default for Motion {
     /// Rest, about the third axis through the origin.
     fn default() -> Self {
         let (axis, keys) = (third_axis(), vec![Key::default()]);
-        Self { axis, centre: [0.0; 3], keys, interpolation: Interpolation::Linear }
+        Self { axis, centre: [0.0; 3], keys, steering: None, interpolation: Interpolation::Linear }
     }
 }
 
@@ -73,6 +78,62 @@ pub struct Key {
     /// Translation, in m. Default none.
     #[serde(default, with = "Reals::<Number, 3>")]
     pub translate: [f64; 3],
+}
+
+/// The pose of a motion that a program steers: one until a time, and another from a later time on. Clones share it.
+#[derive(Clone, Debug)]
+pub struct Steering(Arc<RwLock<SteeredPoses>>);
+
+/// Two poses of a [`Steering`], with their times in s.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SteeredPoses {
+    /// The time until which the first pose holds.
+    pub start: f64,
+    /// The first pose.
+    pub from: Pose,
+    /// The time from which the second pose holds.
+    pub end: f64,
+    /// The second pose.
+    pub to: Pose,
+}
+
+impl PartialEq for Steering {
+    /// Whether both are one.
+    fn eq(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.0, &other.0)
+    }
+}
+
+impl Steering {
+    /// Rests at a pose.
+    #[must_use]
+    pub fn new(pose: Pose) -> Self {
+        Self(Arc::new(RwLock::new(SteeredPoses { start: 0.0, from: pose, end: 0.0, to: pose })))
+    }
+
+    /// Moves to a pose between two times, in s, from where it is at the first.
+    pub fn steer(&self, start: f64, end: f64, to: Pose) {
+        let from = self.pose(start);
+        self.set_poses(SteeredPoses { start, from, end, to });
+    }
+
+    /// Returns the two poses.
+    #[must_use]
+    pub fn poses(&self) -> SteeredPoses {
+        *self.0.read().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Replaces both poses.
+    pub fn set_poses(&self, poses: SteeredPoses) {
+        *self.0.write().unwrap_or_else(PoisonError::into_inner) = poses;
+    }
+
+    /// Returns the pose at a time. Simulations ask for the times at which steps start and end only, so the pose between
+    /// is that of the nearer end.
+    fn pose(&self, time: f64) -> Pose {
+        let SteeredPoses { start, from, end, to } = self.poses();
+        if time >= end || (time > start && time - start >= end - time) { to } else { from }
+    }
 }
 
 fn third_axis() -> [f64; 3] {
@@ -99,6 +160,9 @@ impl Motion {
     /// Returns the pose at a time, in s.
     #[must_use]
     pub fn pose(&self, time: f64) -> Pose {
+        if let Some(steering) = &self.steering {
+            return steering.pose(time);
+        }
         let Key { angle, translate, .. } = self.key(time);
         Pose::rotation(self.axis, angle, self.centre).translated(translate)
     }
@@ -106,6 +170,9 @@ impl Motion {
     /// Whether the pose at time `from` differs from that at time `to`, in s.
     #[must_use]
     pub fn moves(&self, from: f64, to: f64) -> bool {
+        if let Some(steering) = &self.steering {
+            return steering.pose(from) != steering.pose(to);
+        }
         self.key(from) != Key { time: from, ..self.key(to) }
     }
 

@@ -1,6 +1,7 @@
 //! Wind: a uniform flow of air, constant or with gusts, that acts on triangles.
 
 use std::f64::consts::TAU;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use energy_dsl::Vector3;
 use energy_elements::WindDrag;
@@ -33,6 +34,39 @@ pub struct Wind {
     /// Drag coefficient C along the surface. Default 0.02.
     #[serde(default = "skin", with = "Real::<NonNegative>")]
     pub along: f64,
+    /// A velocity that a program sets while a simulation runs, in place of `velocity`; `None` for that of the scene.
+    #[serde(skip)]
+    pub steering: Option<SteeredVelocity>,
+}
+
+/// A velocity of the air, in m/s, that a program sets. Clones share it.
+#[derive(Clone, Debug)]
+pub struct SteeredVelocity(Arc<Mutex<Vector3<f64>>>);
+
+impl PartialEq for SteeredVelocity {
+    /// Whether both are one.
+    fn eq(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.0, &other.0)
+    }
+}
+
+impl SteeredVelocity {
+    /// Begins with a velocity, in m/s.
+    #[must_use]
+    pub fn new(velocity: Vector3<f64>) -> Self {
+        Self(Arc::new(Mutex::new(velocity)))
+    }
+
+    /// Returns the velocity, in m/s.
+    #[must_use]
+    pub fn get(&self) -> Vector3<f64> {
+        *self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Sets the velocity of the next steps, in m/s.
+    pub fn set(&self, velocity: Vector3<f64>) {
+        *self.0.lock().unwrap_or_else(PoisonError::into_inner) = velocity;
+    }
 }
 
 /// A sinusoidal gust: amplitude × sin(2π (t/period + phase)).
@@ -68,7 +102,8 @@ impl Wind {
     /// ```
     /// use cloth_physics::wind::{Gust, Wind};
     /// let gust = Gust { amplitude: [0.0, 1.0, 0.0], period: 4.0, phase: 0.0 };
-    /// let wind = Wind { velocity: [3.0, 0.0, 0.0], gusts: vec![gust], density: 1.2, across: 1.2, along: 0.02 };
+    /// let (velocity, gusts) = ([3.0, 0.0, 0.0], vec![gust]);
+    /// let wind = Wind { velocity, gusts, density: 1.2, across: 1.2, along: 0.02, steering: None };
     /// assert_eq!(wind.at(1.0), [3.0, 1.0, 0.0]);
     /// ```
     #[must_use]
@@ -77,7 +112,8 @@ impl Wind {
             let strength = (TAU * (time / gust.period + gust.phase)).sin();
             std::array::from_fn(|axis| velocity[axis] + strength * gust.amplitude[axis])
         };
-        self.gusts.iter().fold(self.velocity, add)
+        let velocity = self.steering.as_ref().map_or(self.velocity, SteeredVelocity::get);
+        self.gusts.iter().fold(velocity, add)
     }
 
     /// Creates the term of the wind on these triangles.

@@ -11,7 +11,7 @@ use cloth_physics::contact::{
 };
 use cloth_physics::geometry::{Pose, norm};
 use cloth_physics::mesh::{MeshError, ObjError, TriangleMesh, read_obj};
-use cloth_physics::motion::Motion;
+use cloth_physics::motion::{Motion, Steering};
 
 /// An obstacle: exactly one of `plane`, `sphere`, `capsule`, `box` and `mesh`.
 #[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
@@ -252,6 +252,29 @@ impl ObstacleDescription {
             ShapeKeys::Mesh(keys) => vec![folder.join(&keys.path)],
             _ => Vec::new(),
         }
+    }
+
+    /// Returns the name of the obstacle with index `number` in the scene.
+    #[must_use]
+    pub fn name(&self, number: usize) -> String {
+        let shape = match &self.shape {
+            ShapeKeys::Plane(_) => "plane",
+            ShapeKeys::Sphere(_) => "sphere",
+            ShapeKeys::Capsule(_) => "capsule",
+            ShapeKeys::Block(_) => "box",
+            ShapeKeys::Mesh(_) => "mesh",
+        };
+        self.rest.name.clone().unwrap_or_else(|| format!("{shape} {number}"))
+    }
+
+    /// Lets a program move the obstacle while the simulation runs, from its pose at the start.
+    #[must_use]
+    pub fn steered(&mut self) -> Steering {
+        let mut motion = self.rest.motion.clone().unwrap_or_default();
+        let steering = Steering::new(motion.pose(0.0));
+        motion.steering = Some(steering.clone());
+        self.rest.motion = Some(motion);
+        steering
     }
 
     /// Whether the obstacle deforms.

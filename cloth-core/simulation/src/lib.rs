@@ -41,6 +41,6 @@ pub mod model;
 pub mod output;
 pub mod simulation;
 
-use cloth_physics::{Body, barrier, collision, contact, fabric, geometry, integrator, mesh, motion};
+use cloth_physics::{Body, barrier, collision, contact, fabric, geometry, integrator, mesh, motion, wind};
 use cloth_scene as scene;
 pub use simulation::{Island, Simulation, SimulationError, Summary};

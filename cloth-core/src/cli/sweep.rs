@@ -9,7 +9,7 @@ use std::thread;
 use anyhow::{Context, Result, anyhow, bail};
 use clap::Args;
 use cloth_core::output::OutputFolder;
-use cloth_core::run::{Ending, Record, Run, RunOptions};
+use cloth_core::run::{Checkpoint, Ending, Record, Run, RunOptions};
 use cloth_core::scene::Scene;
 use toml::{Table, Value};
 
@@ -40,7 +40,8 @@ struct Choice {
     values: Vec<Value>,
     /// Text of the scene.
     text: String,
-    /// Name of the folder, from the text: the same scene continues in the same folder.
+    /// Name of the folder: a hash of everything that the run reads. The same run continues in the same folder. After an
+    /// edit of a mesh, no earlier result counts.
     name: String,
 }
 
@@ -51,7 +52,7 @@ impl Sweep {
         let text = std::fs::read_to_string(&self.parameters).with_context(|| format!("cannot read {file}"))?;
         let mut grid = Vec::new();
         flatten("", &text.parse().with_context(|| file.clone())?, &mut grid).with_context(|| file.clone())?;
-        let choices = choices(&base, &grid).context(file)?;
+        let choices = choices(&base, &grid, &self.scene).context(file)?;
         std::fs::create_dir_all(&self.output).with_context(|| format!("cannot create {}", self.output.display()))?;
         let interrupts = Interrupts::listen()?;
         let failures = self.simulate(&choices, &interrupts)?;
@@ -202,8 +203,8 @@ fn flatten(prefix: &str, table: &Table, grid: &mut Vec<(String, Vec<Value>)>) ->
     Ok(())
 }
 
-/// Returns all combinations of values; the last key varies fastest.
-fn choices(base: &Table, grid: &[(String, Vec<Value>)]) -> Result<Vec<Choice>> {
+/// Returns all combinations of values; the last key varies fastest. `path` is that of the scene.
+fn choices(base: &Table, grid: &[(String, Vec<Value>)], path: &Path) -> Result<Vec<Choice>> {
     let mut combinations: Vec<Vec<Value>> = vec![Vec::new()];
     for (_, values) in grid {
         let extend = |head: Vec<Value>| values.iter().map(move |value| [&head[..], slice::from_ref(value)].concat());
@@ -215,7 +216,7 @@ fn choices(base: &Table, grid: &[(String, Vec<Value>)]) -> Result<Vec<Choice>> {
             set(&mut scene, key, value)?;
         }
         let text = toml::to_string(&scene)?;
-        let name = format!("{:016x}", fnv1a(text.as_bytes()));
+        let name = format!("{:016x}", identity(&text, path));
         Ok(Choice { values, text, name })
     };
     combinations.into_iter().map(choice).collect()
@@ -240,7 +241,22 @@ fn set(scene: &mut Table, path: &str, value: &Value) -> Result<()> {
     Ok(())
 }
 
-/// The hash FNV-1a.
-fn fnv1a(bytes: &[u8]) -> u64 {
-    bytes.iter().fold(0xcbf2_9ce4_8422_2325, |hash, &byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3))
+/// Returns a hash of what a run reads: the version of the program, the text of its scene, and the meshes and materials
+/// that the scene names. An invalid scene has none.
+fn identity(text: &str, path: &Path) -> u64 {
+    let version = format!("{}, checkpoints {}\n", env!("CARGO_PKG_VERSION"), Checkpoint::VERSION);
+    let files = Scene::parse(text, path).map_or_else(|_| Vec::new(), |scene| scene.input_files());
+    let start = [version.as_bytes(), text.as_bytes()].into_iter().fold(FNV_OFFSET, fnv1a);
+    files.iter().fold(start, |hash, file| match std::fs::read(file) {
+        Ok(contents) => fnv1a(fnv1a(hash, &contents.len().to_le_bytes()), &contents),
+        Err(_) => fnv1a(hash, b"unreadable"),
+    })
+}
+
+/// The start of the hash FNV-1a.
+const FNV_OFFSET: u64 = 0xcbf2_9ce4_8422_2325;
+
+/// Continues the hash FNV-1a with some bytes.
+fn fnv1a(hash: u64, bytes: &[u8]) -> u64 {
+    bytes.iter().fold(hash, |hash, &byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3))
 }

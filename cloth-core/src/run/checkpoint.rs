@@ -5,8 +5,6 @@ use serde::{Deserialize, Serialize};
 use super::input_files::InputFile;
 use crate::simulation::{RestoreError, SavedState};
 
-/// The version of checkpoints that this program reads and writes.
-const VERSION: u32 = 4;
 /// The first word of a checkpoint; version, length and CRC-32 of the rest follow.
 const KEYWORD: &str = "cloth-checkpoint";
 
@@ -46,14 +44,14 @@ pub enum CheckpointError {
     Damaged { path: PathBuf, reason: String },
     /// The file was written by a newer program.
     #[error(
-        "the checkpoint {} has version {version}, but this program reads version {VERSION}; use the newer program",
-        .path.display()
+        "the checkpoint {} has version {version}, but this program reads version {}; use the newer program",
+        .path.display(), Checkpoint::VERSION
     )]
     Newer { path: PathBuf, version: u32 },
     /// The file was written by an older program.
     #[error(
-        "the checkpoint {} has version {version}, but this program reads version {VERSION}; start the run again",
-        .path.display()
+        "the checkpoint {} has version {version}, but this program reads version {}; start the run again",
+        .path.display(), Checkpoint::VERSION
     )]
     Older { path: PathBuf, version: u32 },
     /// A mesh or material is not the one that the run began with.
@@ -68,6 +66,9 @@ pub enum CheckpointError {
 }
 
 impl Checkpoint {
+    /// The version that this program reads and writes.
+    pub const VERSION: u32 = 4;
+
     /// Encodes the checkpoint as the contents of a file: a line of text with version, length and checksum, then JSON
     /// with exact numbers.
     ///
@@ -75,7 +76,8 @@ impl Checkpoint {
     /// Returns an error if a number is not finite.
     pub fn to_bytes(&self) -> Result<Vec<u8>, serde_json::Error> {
         let body = serde_json::to_vec(self)?;
-        let mut file = format!("{KEYWORD} {VERSION} {} {:08x}\n", body.len(), crc32fast::hash(&body)).into_bytes();
+        let mut file =
+            format!("{KEYWORD} {} {} {:08x}\n", Self::VERSION, body.len(), crc32fast::hash(&body)).into_bytes();
         file.extend(body);
         Ok(file)
     }
@@ -105,10 +107,10 @@ impl Checkpoint {
         let damaged = |reason: &str| CheckpointError::Damaged { path: path.clone(), reason: reason.to_owned() };
         let version: u32 =
             words.next().and_then(|word| word.parse().ok()).ok_or_else(|| damaged("its first line is broken"))?;
-        if version > VERSION {
+        if version > Self::VERSION {
             return Err(CheckpointError::Newer { path, version });
         }
-        if version < VERSION {
+        if version < Self::VERSION {
             return Err(CheckpointError::Older { path, version });
         }
         let (length, checksum) = (words.next(), words.next());

@@ -12,5 +12,5 @@ mod pressed;
 pub use block::Contact;
 pub(crate) use block::factors;
 pub use in_matrix::ContactsInMatrix;
-pub use model::{ContactCounts, ContactMemory, ContactModel};
+pub use model::{ContactCounts, ContactMemory, ContactModel, Touching};
 pub use pressed::{Pressed, Presser};

@@ -57,6 +57,11 @@ pub trait ContactModel: std::fmt::Debug + Send {
         None
     }
 
+    /// Returns the pairs in contact at x, where the last step ended, for a caller. Default none.
+    fn touching(&self, _x: &[Vector3<f64>]) -> Vec<Touching> {
+        Vec::new()
+    }
+
     /// Returns what was counted so far.
     fn counts(&self) -> ContactCounts;
 
@@ -67,6 +72,21 @@ pub trait ContactModel: std::fmt::Debug + Send {
 
     /// Restores the memory of a checkpoint.
     fn restore(&mut self, _memory: ContactMemory) {}
+}
+
+/// Two features in contact.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Touching {
+    /// The vertices of the first feature, then those of the second; a vertex of a shorter feature may be repeated.
+    pub vertices: [u32; 4],
+    /// The number of vertices of the first feature: 1 for a point and a triangle, 2 for two edges.
+    pub first: usize,
+    /// Distance of the features, in m.
+    pub distance: f64,
+    /// Unit vector from the second feature to the first.
+    pub normal: Vector3<f64>,
+    /// The push along the normal, in N, without friction.
+    pub force: f64,
 }
 
 /// State that contact keeps from step to step, such as how far sticking pairs have slid.

@@ -14,7 +14,7 @@ use energy_dsl::Vector3;
 use self::constant::ConstantPart;
 pub use self::error::{EvaluationError, SystemError};
 pub use self::linearise::{LinearisationOptions, LinearisedForces};
-use crate::contact::{ContactMemory, ContactModel};
+use crate::contact::{ContactMemory, ContactModel, Touching};
 use crate::matrix::block_matrix::BlockMatrix;
 use crate::matrix::dof_map::DofMap;
 use crate::matrix::pattern::{Pattern, Storage, index};
@@ -155,6 +155,12 @@ impl System {
         if let Some(contact) = &self.contact {
             contact.add_force(x, force);
         }
+    }
+
+    /// Returns the pairs in contact at x, where the last step ended; none if the body does not collide.
+    #[must_use]
+    pub fn touching(&self, x: &[Vector3<f64>]) -> Vec<Touching> {
+        self.contact.as_ref().map_or_else(Vec::new, |contact| contact.touching(x))
     }
 
     /// Whether the body collides.

@@ -6,6 +6,7 @@ pub(crate) mod curvature;
 mod element_list;
 mod force_term;
 pub(crate) mod linearisation;
+mod own_term;
 mod places;
 mod potential;
 pub(crate) mod restriction;
@@ -20,8 +21,11 @@ pub use curvature::{Curvature, change_dense};
 pub use element_list::{ElementList, ListError};
 pub use force_term::ForceTerm;
 pub use linearisation::{Linearisation, Weights};
+pub use own_term::{Order, OwnLaw, OwnResults, OwnTerm};
 pub use places::BlockPlaces;
-pub use potential::{DissipationLaw, DissipationTerm, DrivenLaw, DrivenTerm, PotentialTerm, TapeTerm};
+pub use potential::{
+    DissipationLaw, DissipationTerm, DrivenLaw, DrivenTerm, PotentialTerm, SteeredTapeTerm, SteeredTapes, TapeTerm,
+};
 pub use restriction::Restriction;
 pub use scatter::TriangleBuffer;
 pub use share::{Divisible, Share};

@@ -40,7 +40,7 @@ mod untangle;
 
 use energy_dsl::{Block, Vector3};
 use energy_solve::threads::collect;
-use energy_solve::{Contact, ContactCounts, ContactMemory, ContactModel, DofMap, Pressed};
+use energy_solve::{Contact, ContactCounts, ContactMemory, ContactModel, DofMap, Pressed, Touching};
 
 pub use friction::Grip;
 pub use law::{CURVATURE_AT_HALF, STIFFNESS_RATIO};
@@ -337,6 +337,20 @@ impl ContactModel for BarrierContact {
     fn release(&mut self) {
         self.neighbourhood.release(self.search.threads);
         self.joined.release();
+    }
+
+    fn touching(&self, x: &[Vector3<f64>]) -> Vec<Touching> {
+        let of_part = |active: &Active<'_>| {
+            let touching = |(pair, closest, barrier): (&Pair, Closest, &Barrier)| Touching {
+                vertices: pair.vertices,
+                first: pair.first(),
+                distance: closest.distance,
+                normal: closest.normal,
+                force: barrier.force,
+            };
+            active.iter().map(touching).collect::<Vec<_>>()
+        };
+        self.joined.evaluate(x, Order::Force, self.search.threads, of_part).concat()
     }
 
     fn most_pressed(&self, x: &[Vector3<f64>]) -> Option<Pressed> {

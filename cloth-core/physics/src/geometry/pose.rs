@@ -14,6 +14,38 @@ impl Pose {
     pub const IDENTITY: Self =
         Self { rotation: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], translation: [0.0; 3] };
 
+    /// Returns the motion x ↦ R x + t with these rows of R. `None` unless R is a rotation: Rᵀ R = 1 to 1e-9, without a
+    /// reflection.
+    ///
+    /// ```
+    /// use cloth_physics::geometry::Pose;
+    /// let quarter = [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]];
+    /// assert_eq!(Pose::new(quarter, [0.0, 0.0, 1.0]).unwrap().transform([1.0, 0.0, 0.0]), [0.0, 1.0, 1.0]);
+    /// assert_eq!(Pose::new([[-1.0, 0.0, 0.0], quarter[1], quarter[2]], [0.0; 3]), None);
+    /// ```
+    #[must_use]
+    pub fn new(rotation: [Vector3<f64>; 3], translation: Vector3<f64>) -> Option<Self> {
+        let [a, b, c] = rotation;
+        let products = [[a, a], [b, b], [c, c], [a, b], [b, c], [a, c]].map(|[p, q]| dot(p, q));
+        let is_close = |(product, expected): (f64, f64)| (product - expected).abs() <= 1e-9;
+        let is_rotation = products.into_iter().zip([1.0, 1.0, 1.0, 0.0, 0.0, 0.0]).all(is_close);
+        let is_right_handed = dot(cross(a, b), c) > 0.0;
+        let is_finite = translation.iter().all(|component| component.is_finite());
+        (is_rotation && is_right_handed && is_finite).then_some(Self { rotation, translation })
+    }
+
+    /// The rows of R.
+    #[must_use]
+    pub fn rows(&self) -> [Vector3<f64>; 3] {
+        self.rotation
+    }
+
+    /// t, in m.
+    #[must_use]
+    pub fn translation(&self) -> Vector3<f64> {
+        self.translation
+    }
+
     /// Returns the right-handed rotation by an angle in degrees about an axis through a point (Rodrigues' formula).
     /// Quarter turns are exact up to rounding.
     #[must_use]

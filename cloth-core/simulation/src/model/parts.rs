@@ -189,6 +189,18 @@ impl Model {
         Builder::new(scene, time).model()
     }
 
+    /// Adds a term to an island, with a label of its own, or that of terms with its name and element.
+    pub(crate) fn add_term(&mut self, island: usize, term: Box<dyn Term>) {
+        let label = TermLabel { name: term.name().to_owned(), element: term.declaration().name };
+        let known = self.labels.iter().position(|known| *known == label);
+        let number = known.unwrap_or(self.labels.len());
+        if known.is_none() {
+            self.labels.push(label);
+        }
+        self.islands[island].labels.push(number);
+        self.islands[island].terms.push(term);
+    }
+
     /// Returns the vertex range of each strand of hair.
     pub fn strands(&self) -> impl Iterator<Item = Range<usize>> + '_ {
         self.parts.iter().flat_map(|part| {

@@ -1,3 +1,5 @@
+use std::collections::BTreeMap;
+
 use energy_dsl::{Element, Vector3};
 use energy_elements::WindDrag;
 use energy_solve::{ContactMemory, EvaluationError, PlacedTerm, State, StepStart, System, SystemError};
@@ -27,6 +29,8 @@ pub struct Island {
     moving: Vec<MovingPin>,
     /// Indices of the motions of these pins, without duplicates.
     motions: Vec<usize>,
+    /// Pinned vertices that a program moves, with indices within the island, and their targets in m.
+    targets: Vec<(usize, Vector3<f64>)>,
     /// Whether wind with gusts acts on the island; it then never sleeps.
     in_gusts: bool,
     /// `None` if islands never sleep.
@@ -54,6 +58,15 @@ pub struct SavedIsland {
     /// Energy of contact at the end of the last step, in J.
     #[serde(default)]
     contact_energy: f64,
+}
+
+impl SavedIsland {
+    /// Forgets what depends on the way to the current positions: the history of the integrator, sleep, and how far
+    /// pairs have slid. Plastic strains stay.
+    pub(super) fn forget_motion(&mut self) {
+        (self.integrator, self.sleep) = (IntegratorMemory::default(), SleepState::AWAKE);
+        (self.bristles, self.contact_energy) = Default::default();
+    }
 }
 
 impl Island {
@@ -88,6 +101,7 @@ impl Island {
             integrator,
             moving,
             motions,
+            targets: Vec::new(),
             in_gusts,
             stillness,
             sleep,
@@ -102,6 +116,22 @@ impl Island {
             self.motions.push(pin.motion);
         }
         self.moving.push(pin);
+    }
+
+    /// Takes the targets of its pinned vertices, by vertex of the scene, and wakes if there are any.
+    pub(super) fn set_targets(&mut self, targets: &BTreeMap<usize, Vector3<f64>>) {
+        let before = std::mem::take(&mut self.targets);
+        let had = !before.is_empty();
+        // A pin without a motion of its own stays where it is.
+        before.iter().for_each(|(vertex, _)| self.body.v[*vertex] = [0.0; 3]);
+        if !targets.is_empty() {
+            let own = self.vertices.iter().enumerate();
+            let pinned = own.filter(|(place, _)| self.body.system.dofs().place(*place).is_none());
+            self.targets = pinned.filter_map(|(place, vertex)| Some((place, *targets.get(vertex)?))).collect();
+        }
+        if had || !self.targets.is_empty() {
+            self.wake();
+        }
     }
 
     /// The vertices of the island, as indices into the scene.
@@ -183,6 +213,10 @@ impl Island {
             let target = context.motions[pin.motion].pose(context.end).transform(pin.initial);
             let here = self.body.x[pin.vertex];
             self.body.v[pin.vertex] = std::array::from_fn(|axis| (target[axis] - here[axis]) / dt);
+        }
+        for &(vertex, target) in &self.targets {
+            let here = self.body.x[vertex];
+            self.body.v[vertex] = std::array::from_fn(|axis| (target[axis] - here[axis]) / dt);
         }
         self.move_obstacles([context.time, context.end]);
         self.begin_step(context.time, dt)?;

@@ -4,6 +4,7 @@ mod collision;
 mod deformed;
 mod island;
 mod obstacle_crossings;
+mod open;
 mod prescribed;
 mod release;
 mod saved;
@@ -21,6 +22,7 @@ use energy_solve::{Counts, EvaluationError, PlacedTerm, SystemError, index};
 
 pub use deformed::MostDeformed;
 pub use island::{Island, SavedIsland};
+pub use open::{ControlError, Controls, OwnForce, Snapshot};
 pub use saved::{RestoreError, SavedCounts, SavedState};
 pub use summary::{Summary, TermSummary};
 pub use totals::Totals;
@@ -36,6 +38,7 @@ use crate::model::{Model, ModelError, MovingPin, Part, PartKind, TermLabel};
 use crate::motion::Motion;
 use crate::scene::{ContactChoice, Scene};
 use collision::add_contact;
+use open::Controlled;
 use prescribed::Prescribed;
 pub use release::Extension;
 use release::Releases;
@@ -64,6 +67,9 @@ pub enum SimulationError {
         /// The reason.
         source: Box<SimulationError>,
     },
+    /// A control does not fit the scene or the state.
+    #[error(transparent)]
+    Control(#[from] ControlError),
     /// A state cannot be restored.
     #[error(transparent)]
     Restore(#[from] RestoreError),
@@ -127,6 +133,8 @@ pub struct Simulation {
     released: usize,
     /// The limit of threads; `None` for one per core.
     threads: Option<usize>,
+    /// What a program controls.
+    controlled: Controlled,
 }
 
 impl Simulation {
@@ -186,6 +194,7 @@ impl Simulation {
             releases: None,
             released: 0,
             threads: None,
+            controlled: Controlled::default(),
         };
         simulation.warn_of_unstable_step()?;
         simulation.warn_of_vertices_inside_obstacles();

@@ -83,6 +83,8 @@ impl Simulation {
         fresh.releases = Some(releases);
         std::mem::swap(&mut fresh.summary, &mut self.summary);
         std::mem::swap(&mut fresh.ledger, &mut self.ledger);
+        fresh.controlled = std::mem::take(&mut self.controlled);
+        fresh.hand_out_targets();
         if let Some(threads) = self.threads {
             fresh.set_threads(threads);
         }

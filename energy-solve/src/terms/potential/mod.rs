@@ -6,6 +6,7 @@ mod evaluated;
 mod named_stencils;
 mod pack_energies;
 mod placed;
+mod steered;
 mod tapes;
 mod work;
 
@@ -17,6 +18,7 @@ use energy_dsl::{Declaration, Packed, PackedPotential};
 pub use self::dissipation::{DissipationLaw, DissipationTerm};
 pub use self::driven::{DrivenLaw, DrivenTerm};
 use self::placed::PlacedPotentialTerm;
+pub use self::steered::{SteeredTapeTerm, SteeredTapes};
 use self::tapes::TapePacks;
 use crate::matrix::dof_map::DofMap;
 use crate::matrix::pattern::{Pattern, index};

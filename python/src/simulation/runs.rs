@@ -1,26 +1,19 @@
-//! Scenes of cloth: stepped by hand, or run to an output folder.
+//! Scenes of cloth, run to an output folder.
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use cloth_core::output::OutputError;
-use cloth_core::run::{Ending, Event, Run, RunError, RunOptions};
+use cloth_core::run::{Checkpoint, Ending, Event, Run, RunError, RunOptions};
 use cloth_core::scene::Scene;
-use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::exceptions::{PyKeyboardInterrupt, PyRuntimeError};
 use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyList};
 
-use crate::errors::{FolderInUseError, failed, wrong};
-use crate::exclusive::Exclusive;
-
-/// A scene that is stepped by hand.
-#[pyclass(frozen, subclass, module = "energy_dsl")]
-pub struct Simulation {
-    inner: Exclusive<cloth_core::Simulation>,
-}
+use crate::errors::{FolderInUseError, ResourceError, with_causes, wrong};
 
 /// A scene's text; JSON objects are written as TOML.
-fn toml_text(text: &str) -> PyResult<String> {
+pub(super) fn toml_text(text: &str) -> PyResult<String> {
     if !text.trim_start().starts_with('{') {
         return Ok(text.to_owned());
     }
@@ -29,100 +22,12 @@ fn toml_text(text: &str) -> PyResult<String> {
 }
 
 /// Adds the line that a message about a text names: of a dictionary, users never see the text.
-fn with_line(text: &str, message: &str) -> String {
+pub(super) fn with_line(text: &str, message: &str) -> String {
     let number = message.split(':').nth(1).and_then(|number| number.parse::<usize>().ok());
     match number.and_then(|number| text.lines().nth(number.checked_sub(1)?)) {
         Some(line) => format!("{message}: {}", line.trim()),
         None => message.to_owned(),
     }
-}
-
-#[pymethods]
-impl Simulation {
-    /// Reads the text of a scene. Relative paths in it start at the folder of `path`.
-    #[new]
-    #[pyo3(signature = (text, path = PathBuf::from("scene.toml"), threads = None))]
-    fn new(py: Python<'_>, text: &str, path: PathBuf, threads: Option<usize>) -> PyResult<Self> {
-        let text = toml_text(text)?;
-        let inner = py.detach(|| {
-            let scene = Scene::parse(&text, &path).map_err(|error| with_line(&text, &error.to_string()))?;
-            cloth_core::Simulation::new(&scene).map_err(|error| error.to_string())
-        });
-        let inner = match (inner.map_err(wrong)?, threads) {
-            (inner, Some(threads)) => inner.with_threads(threads),
-            (inner, None) => inner,
-        };
-        Ok(Self { inner: Exclusive::new("Simulation", inner) })
-    }
-
-    /// Takes steps of the scene's time grid, at most until its end. Returns the number taken. Ctrl-C stops after the
-    /// current step.
-    #[pyo3(signature = (steps = 1))]
-    fn step(&self, py: Python<'_>, steps: u64) -> PyResult<u64> {
-        let mut guard = self.inner.get()?;
-        let simulation = &mut *guard;
-        for done in 0..steps {
-            if simulation.is_finished() {
-                return Ok(done);
-            }
-            py.check_signals()?;
-            py.detach(|| simulation.step().map(drop)).map_err(failed)?;
-        }
-        Ok(steps)
-    }
-
-    /// Time, in s.
-    #[getter]
-    fn time(&self) -> PyResult<f64> {
-        Ok(self.inner.get()?.time())
-    }
-
-    #[getter]
-    fn is_finished(&self) -> PyResult<bool> {
-        Ok(self.inner.get()?.is_finished())
-    }
-
-    /// Steps from start to end.
-    #[getter]
-    fn steps(&self) -> PyResult<u64> {
-        Ok(self.inner.get()?.steps())
-    }
-
-    /// Steps taken so far.
-    #[getter]
-    fn steps_done(&self) -> PyResult<u64> {
-        Ok(self.inner.get()?.steps_done())
-    }
-
-    #[getter]
-    fn warnings(&self) -> PyResult<Vec<String>> {
-        Ok(self.inner.get()?.warnings().to_vec())
-    }
-
-    /// Positions of all vertices, in m, as a new array of shape (vertices, 3).
-    #[getter]
-    fn positions<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        vectors(py, self.inner.get()?.positions())
-    }
-
-    /// Velocities of all vertices, in m/s.
-    #[getter]
-    fn velocities<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        vectors(py, self.inner.get()?.velocities())
-    }
-
-    /// Triangles, as indices of vertices.
-    #[getter]
-    fn triangles<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<i64>>> {
-        let simulation = self.inner.get()?;
-        let numbers: Vec<i64> = simulation.triangles().iter().flatten().map(|&vertex| vertex as i64).collect();
-        let rows = numbers.len() / 3;
-        PyArray1::from_vec(py, numbers).reshape([rows, 3])
-    }
-}
-
-fn vectors<'py>(py: Python<'py>, vectors: &[[f64; 3]]) -> PyResult<Bound<'py, PyArray2<f64>>> {
-    PyArray1::from_vec(py, vectors.as_flattened().to_vec()).reshape([vectors.len(), 3])
 }
 
 /// Runs a scene and writes its results to a folder, as `cloth run` does. Returns the number of steps taken.
@@ -146,8 +51,10 @@ pub fn run(
     let options = RunOptions { overwrite, checkpoint_interval: checkpoint, ignore_memory };
     let text = toml_text(text)?;
     to_the_end(py, threads, progress, || {
-        Run::new(text.clone(), Path::new(path), Path::new(output), options)
-            .map_err(|error| Refusal { message: with_line(&text, &error.to_string()), ..error.into() })
+        Run::new(text.clone(), Path::new(path), Path::new(output), options).map_err(|error| {
+            let Refusal { message, kind } = error.into();
+            Refusal { message: with_line(&text, &message), kind }
+        })
     })
 }
 
@@ -167,20 +74,39 @@ pub fn resume(
 /// Why a run cannot start.
 struct Refusal {
     message: String,
-    folder_is_in_use: bool,
+    kind: RefusalKind,
+}
+
+#[derive(Clone, Copy, PartialEq)]
+enum RefusalKind {
+    /// The scene or the folder is wrong.
+    Wrong,
+    /// Another process writes to the folder.
+    FolderInUse,
+    /// A file cannot be written, or memory is short.
+    Resources,
 }
 
 impl From<RunError> for Refusal {
     fn from(error: RunError) -> Self {
-        let folder_is_in_use = matches!(error, RunError::Output(OutputError::InUse { .. }));
-        Self { message: error.to_string(), folder_is_in_use }
+        let kind = match &error {
+            RunError::Output(OutputError::InUse { .. }) => RefusalKind::FolderInUse,
+            RunError::Output(OutputError::File { .. } | OutputError::Folder { .. }) | RunError::Memory { .. } => {
+                RefusalKind::Resources
+            }
+            _ => RefusalKind::Wrong,
+        };
+        Self { message: with_causes(&error), kind }
     }
 }
 
 /// How a run ended, without the interpreter's lock.
 enum Outcome {
     Refused(Refusal),
+    /// A step failed.
     Failed(String),
+    /// A file cannot be written.
+    Unwritten(String),
     Done(u64),
 }
 
@@ -213,7 +139,7 @@ fn to_the_end(
             }
         });
         match ending {
-            Err(error) => Outcome::Failed(error.to_string()),
+            Err(error) => Outcome::Unwritten(with_causes(&error)),
             Ok(Ending { failure: Some(failure), .. }) => Outcome::Failed(failure.to_string()),
             Ok(_) => Outcome::Done(run.simulation().steps_done()),
         }
@@ -223,11 +149,56 @@ fn to_the_end(
             Err(PyKeyboardInterrupt::new_err("the run was interrupted; its results so far were written"))
         }
         (Some(error), _) => Err(error),
-        (None, Outcome::Refused(Refusal { message, folder_is_in_use: true })) => {
-            Err(FolderInUseError::new_err(message))
-        }
-        (None, Outcome::Refused(Refusal { message, .. })) => Err(wrong(message)),
+        (None, Outcome::Refused(Refusal { message, kind })) => Err(match kind {
+            RefusalKind::Wrong => wrong(message),
+            RefusalKind::FolderInUse => FolderInUseError::new_err(message),
+            RefusalKind::Resources => ResourceError::new_err(message),
+        }),
+        (None, Outcome::Unwritten(message)) => Err(ResourceError::new_err(message)),
         (None, Outcome::Failed(message)) => Err(PyRuntimeError::new_err(message)),
         (None, Outcome::Done(steps)) => Ok(steps),
     }
+}
+
+/// Returns the paths of the meshes and materials that a scene names; none if the scene is invalid.
+#[pyfunction]
+pub fn input_files(text: &str, path: PathBuf) -> PyResult<Vec<PathBuf>> {
+    let text = toml_text(text)?;
+    Ok(Scene::parse(&text, &path).map_or_else(|_| Vec::new(), |scene| scene.input_files()))
+}
+
+/// Returns the tables of a scene file.
+#[pyfunction]
+pub fn read_scene<'py>(py: Python<'py>, path: PathBuf) -> PyResult<Bound<'py, PyAny>> {
+    let text = Scene::text(&path).map_err(|error| wrong(with_causes(&error)))?;
+    let table = text.parse::<toml::Table>().map_err(|error| wrong(format!("{}: {error}", path.display())))?;
+    object(py, &toml::Value::Table(table))
+}
+
+/// Returns a value of TOML as an object of Python. Dates, which no scene has, are texts.
+fn object<'py>(py: Python<'py>, value: &toml::Value) -> PyResult<Bound<'py, PyAny>> {
+    Ok(match value {
+        toml::Value::String(text) => text.into_pyobject(py)?.into_any(),
+        toml::Value::Integer(number) => number.into_pyobject(py)?.into_any(),
+        toml::Value::Float(number) => number.into_pyobject(py)?.into_any(),
+        toml::Value::Boolean(truth) => truth.into_pyobject(py)?.to_owned().into_any(),
+        toml::Value::Datetime(date) => date.to_string().into_pyobject(py)?.into_any(),
+        toml::Value::Array(list) => {
+            let list = list.iter().map(|value| object(py, value)).collect::<PyResult<Vec<_>>>()?;
+            PyList::new(py, list)?.into_any()
+        }
+        toml::Value::Table(table) => {
+            let dict = PyDict::new(py);
+            for (key, value) in table {
+                dict.set_item(key, object(py, value)?)?;
+            }
+            dict.into_any()
+        }
+    })
+}
+
+/// Version of the package and of the checkpoints that it reads and writes.
+#[pyfunction]
+pub fn version() -> String {
+    format!("{}, checkpoints {}", env!("CARGO_PKG_VERSION"), Checkpoint::VERSION)
 }
