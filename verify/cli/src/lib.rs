@@ -11,5 +11,6 @@ mod message;
 pub mod plot;
 pub mod progress;
 
-pub use atomic_file::{write_file, write_whole};
+pub use atomic_file::write_file;
+pub use energy_files::write_whole;
 pub use message::message;

@@ -1,0 +1,24 @@
+//! Files that may come from strangers.
+//!
+//! * [`read`] and [`read_text`] read regular files of limited size; [`read_state`] also follows no symbolic link.
+//! * [`write_whole`] and [`PartFile`] write a file completely or not at all, under a random name until it is complete.
+//! * [`FolderLock`] keeps two programs from writing to one folder.
+//! * [`sealed`] stores a state with its version and checksum, in two generations.
+//! * [`printable`] shows a name without control characters.
+//!
+//! A folder of results may come from a stranger as well, who may have put symbolic links, pipes or devices into it.
+//! Nothing here writes, locks or reads a state through a link in the folder.
+#![forbid(unsafe_code)]
+
+mod folder;
+mod lock;
+mod print;
+mod read;
+pub mod sealed;
+mod write;
+
+pub use folder::subfolder;
+pub use lock::{FolderLock, LockError};
+pub use print::printable;
+pub use read::{open, read, read_state, read_text, utf8};
+pub use write::{PartFile, remove_parts, write_whole};
