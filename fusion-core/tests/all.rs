@@ -4,6 +4,7 @@ mod attachments;
 mod bad_input;
 mod command_line;
 mod figure;
+mod gltf_files;
 mod inputs;
 mod joints;
 mod real_body;
