@@ -5,6 +5,7 @@ mod bad_input;
 mod command_line;
 mod figure;
 mod gltf_files;
+mod hostile_files;
 mod inputs;
 mod joints;
 mod real_body;

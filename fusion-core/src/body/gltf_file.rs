@@ -11,6 +11,9 @@ use super::mesh::Mesh;
 use super::skin::SkinBones;
 use super::skinned::{BodyError, SkinnedBody};
 
+/// The largest file, in bytes.
+const LARGEST_FILE: u64 = 256 << 20;
+
 /// A glTF file without a usable skinned body.
 #[derive(Debug, thiserror::Error)]
 pub enum GltfError {
@@ -52,7 +55,8 @@ pub enum GltfError {
 /// # Errors
 /// If the file is malformed or has no skinned mesh with embedded data.
 pub fn read_gltf(path: &Path) -> Result<SkinnedBody, GltfError> {
-    let bytes = std::fs::read(path).map_err(|source| GltfError::Unreadable { path: path.to_owned(), source })?;
+    let bytes = energy_files::read(path, LARGEST_FILE)
+        .map_err(|source| GltfError::Unreadable { path: path.to_owned(), source })?;
     parse_gltf(&bytes, path)
 }
 
@@ -99,9 +103,6 @@ fn parse(bytes: &[u8]) -> Result<SkinnedBody, Unusable> {
         surface.add(primitive, &order, &mut accessors).map_err(within)?;
     }
     let Surface { vertices, triangles, weights, .. } = surface;
-    if let Some(vertex) = vertices.iter().position(|v| !v.iter().all(|x| x.is_finite())) {
-        return Err(Unusable::Body(BodyError::NonFinite { vertex }));
-    }
     SkinnedBody::new(Mesh::new(vertices, triangles), bones, weights).map_err(Unusable::Body)
 }
 

@@ -9,6 +9,9 @@ use super::print;
 use super::render::Render;
 use super::track::Track;
 
+/// The largest number of frames of a demonstration: half an hour.
+const MOST_FRAMES: u64 = 54_000;
+
 /// Options of `fusion demo`.
 #[derive(Debug, Args)]
 pub struct Demo {
@@ -16,7 +19,7 @@ pub struct Demo {
     #[arg(short, long, default_value = "out/fusion")]
     output: PathBuf,
     /// Frames to track, at 30 Hz.
-    #[arg(long, default_value_t = 60, value_parser = clap::builder::RangedU64ValueParser::<usize>::new().range(1..))]
+    #[arg(long, default_value_t = 60, value_parser = clap::builder::RangedU64ValueParser::<usize>::new().range(1..=MOST_FRAMES))]
     frames: usize,
 }
 

@@ -82,6 +82,9 @@ pub struct Track {
     overwrite: bool,
 }
 
+/// The largest file of options, in bytes.
+const LARGEST_OPTIONS: u64 = 1 << 20;
+
 /// Options in a file.
 #[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -312,7 +315,7 @@ impl Track {
         }
         let Some(path) = &self.options else { return Ok(defaults) };
         let here = || path.display().to_string();
-        let text = std::fs::read_to_string(path).with_context(here)?;
+        let text = energy_files::read_text(path, LARGEST_OPTIONS).with_context(here)?;
         // Reports an unknown key or a wrong type with its position.
         serde_json::from_str::<Parameters>(&text).with_context(here)?;
         let mut all = serde_json::to_value(defaults)?;

@@ -4,7 +4,7 @@ use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
 use serde::{Deserialize, Serialize};
 
 use super::matching::matched;
-use crate::body::Bone;
+use crate::body::{Bone, FARTHEST};
 use crate::json_file::{JsonFileError, read_json, write_json};
 
 /// A file of a skeleton that cannot be used.
@@ -96,7 +96,7 @@ impl Skeleton {
                 let bad = SkeletonError::BadFrame { frame };
                 let Some(&[w, i, j, k, x, y, z]) = numbers.get(at) else { return Err(bad) };
                 let q = Quaternion::new(w, i, j, k);
-                if !((q.norm() - 1.0).abs() < 1e-3 && [x, y, z].iter().all(|t| t.is_finite())) {
+                if !((q.norm() - 1.0).abs() < 1e-3 && [x, y, z].iter().all(|t| t.abs() <= FARTHEST)) {
                     return Err(bad);
                 }
                 Ok(Isometry3::from_parts(Translation3::new(x, y, z), UnitQuaternion::from_quaternion(q)))
@@ -155,8 +155,12 @@ impl Skeleton {
     /// Writes a file completely or not at all.
     ///
     /// # Errors
-    /// If the file cannot be written.
+    /// If a number is not finite, which JSON cannot represent, or the file cannot be written.
     pub fn write(&self, path: &Path) -> Result<(), SkeletonError> {
+        let is_finite = |frame: &[[f64; 7]]| frame.as_flattened().iter().all(|x| x.is_finite());
+        if let Some(frame) = self.frames.iter().position(|frame| !is_finite(frame)) {
+            return Err(SkeletonError::BadFrame { frame });
+        }
         Ok(write_json(path, self)?)
     }
 }

@@ -4,7 +4,7 @@
 //! * [`write_whole`] and [`PartFile`] write a file completely or not at all, under a random name until it is complete.
 //! * [`FolderLock`] keeps two programs from writing to one folder.
 //! * [`sealed`] stores a state with its version and checksum, in two generations.
-//! * [`printable`] shows a name without control characters.
+//! * [`printable`] shows a name without control characters, [`excerpt`] its start.
 //!
 //! A folder of results may come from a stranger as well, who may have put symbolic links, pipes or devices into it.
 //! Nothing here writes, locks or reads a state through a link in the folder.
@@ -19,6 +19,6 @@ mod write;
 
 pub use folder::subfolder;
 pub use lock::{FolderLock, LockError};
-pub use print::printable;
+pub use print::{excerpt, printable};
 pub use read::{open, read, read_state, read_text, utf8};
 pub use write::{PartFile, remove_parts, write_whole};
