@@ -8,5 +8,7 @@ mod gltf_files;
 mod hostile_files;
 mod inputs;
 mod joints;
+mod mutated_files;
 mod real_body;
+mod resumed_tracks;
 mod surface;

@@ -2,11 +2,13 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
 use clap::Args;
+use energy_cli::Interrupts;
 use fusion_core::skeleton::BoneNoise;
 
 use super::evaluate::{Evaluate, summary};
 use super::print;
 use super::render::Render;
+use super::session::Ended;
 use super::track::Track;
 
 /// The largest number of frames of a demonstration: half an hour.
@@ -24,7 +26,8 @@ pub struct Demo {
 }
 
 impl Demo {
-    pub fn run(&self) -> Result<()> {
+    /// Renders, tracks and evaluates.
+    pub fn run(&self, interrupts: &Interrupts) -> Result<Ended> {
         audit()?;
         let runs = [
             ("exact bones", BoneNoise::default(), false),
@@ -35,8 +38,10 @@ impl Demo {
             print(&format!("{name}:\n"))?;
             let folder = self.output.join(name.replace(' ', "-"));
             let (recording, track) = (folder.join("recording"), folder.join("track"));
-            Render::figure(self.frames, noise, &recording).run()?;
-            Track::of(&recording, unknown_bones, &track).run()?;
+            Render::figure(self.frames, noise, &recording).run_until(interrupts.flag())?;
+            if Track::of(&recording, unknown_bones, &track).run(interrupts)? == Ended::Stopped {
+                return Ok(Ended::Stopped);
+            }
             rows.push((name, Evaluate::of(&recording, &track).run()?));
             // Nine tenths of the files, which can be computed again.
             for meshes in [recording.join("truth"), track.join("meshes")] {
@@ -51,7 +56,8 @@ impl Demo {
             })
             .collect();
         let table: Vec<(&str, &_)> = table.iter().map(|(name, errors)| (name.as_str(), *errors)).collect();
-        print(&format!("{}\n\n{EXPLANATION}", summary(&table)))
+        print(&format!("{}\n\n{EXPLANATION}", summary(&table)))?;
+        Ok(Ended::Complete)
     }
 }
 

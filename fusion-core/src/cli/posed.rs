@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail, ensure};
 use clap::Args;
+use energy_cli::tell;
 use fusion_core::body::{SkinnedBody, figure, figure_motion, read_body, read_gltf, read_makehuman, read_obj};
 use fusion_core::protocol::at_place_of;
 use fusion_core::skeleton::{Bvh, Retarget};
@@ -69,11 +70,11 @@ impl Source {
         let retarget = Retarget::new(&body.bones, &motion)?;
         let missing: Vec<&str> = retarget.missing().collect();
         if !missing.is_empty() {
-            eprintln!(
+            tell(&format!(
                 "warning: {} has no joint for {}: they move with their parents",
                 path.display(),
                 missing.join(", ")
-            );
+            ));
         }
         let last = self.to.unwrap_or(motion.frames() - 1);
         ensure!(last < motion.frames(), "--to {last}: {} has {} frames", path.display(), motion.frames());

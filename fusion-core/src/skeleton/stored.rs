@@ -1,5 +1,6 @@
 use std::path::{Path, PathBuf};
 
+use energy_files::excerpt;
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
 use serde::{Deserialize, Serialize};
 
@@ -88,19 +89,19 @@ impl Skeleton {
     /// If a bone is missing, or a number is not finite.
     pub fn motions(&self, frame: usize, bones: &[Bone]) -> Result<Option<Vec<Isometry3<f64>>>, SkeletonError> {
         let Some(numbers) = self.frames.get(frame).filter(|numbers| !numbers.is_empty()) else { return Ok(None) };
-        let motion =
-            |bone: &Bone| {
-                let at = self.bones.iter().position(|name| *name == bone.name).ok_or_else(|| {
-                    SkeletonError::MissingBone { bone: bone.name.clone(), known: self.bones.join(", ") }
-                })?;
-                let bad = SkeletonError::BadFrame { frame };
-                let Some(&[w, i, j, k, x, y, z]) = numbers.get(at) else { return Err(bad) };
-                let q = Quaternion::new(w, i, j, k);
-                if !((q.norm() - 1.0).abs() < 1e-3 && [x, y, z].iter().all(|t| t.abs() <= FARTHEST)) {
-                    return Err(bad);
-                }
-                Ok(Isometry3::from_parts(Translation3::new(x, y, z), UnitQuaternion::from_quaternion(q)))
-            };
+        let motion = |bone: &Bone| {
+            let at = self.bones.iter().position(|name| *name == bone.name).ok_or_else(|| {
+                let known = excerpt(&self.bones.join(", ")).into_owned();
+                SkeletonError::MissingBone { bone: bone.name.clone(), known }
+            })?;
+            let bad = SkeletonError::BadFrame { frame };
+            let Some(&[w, i, j, k, x, y, z]) = numbers.get(at) else { return Err(bad) };
+            let q = Quaternion::new(w, i, j, k);
+            if !((q.norm() - 1.0).abs() < 1e-3 && [x, y, z].iter().all(|t| t.abs() <= FARTHEST)) {
+                return Err(bad);
+            }
+            Ok(Isometry3::from_parts(Translation3::new(x, y, z), UnitQuaternion::from_quaternion(q)))
+        };
         bones.iter().map(motion).collect::<Result<_, _>>().map(Some)
     }
 

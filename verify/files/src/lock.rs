@@ -125,7 +125,7 @@ fn open(path: &Path) -> std::io::Result<File> {
     match path.symlink_metadata() {
         Err(error) if error.kind() == ErrorKind::NotFound => options.create_new(true).open(path),
         Err(error) => Err(error),
-        Ok(_) => open_state(path, LARGEST_FILE).and_then(|_| options.open(path)),
+        Ok(_) => open_state(path, LARGEST_FILE, &options),
     }
 }
 

@@ -1,6 +1,6 @@
 //! Reads files of limited size.
 
-use std::fs::{File, Metadata};
+use std::fs::{File, Metadata, OpenOptions};
 use std::io::{Error, ErrorKind, Read, Result};
 use std::path::Path;
 
@@ -48,14 +48,18 @@ pub fn read_text(path: &Path, limit: u64) -> Result<String> {
 /// # Errors
 /// As [`read`], and if the path is a symbolic link.
 pub fn read_state(path: &Path, limit: u64) -> Result<Vec<u8>> {
-    contents(open_state(path, limit)?, limit)
+    contents(open_state(path, limit, OpenOptions::new().read(true))?, limit)
 }
 
-/// Opens a file as [`read_state`] does.
-pub(crate) fn open_state(path: &Path, limit: u64) -> Result<File> {
+/// Opens a file that a program has written into a folder of its own, as [`read_state`] does. The options must not
+/// create or truncate it.
+///
+/// # Errors
+/// If the file cannot be opened, is not a regular file, is larger than `limit` bytes, or the path is a symbolic link.
+pub fn open_state(path: &Path, limit: u64, options: &OpenOptions) -> Result<File> {
     let named = path.symlink_metadata()?;
     check(&named, limit)?;
-    let file = File::open(path)?;
+    let file = options.open(path)?;
     match is_same(&named, &file.metadata()?) {
         true => Ok(file),
         false => Err(Error::other("another file took its place")),

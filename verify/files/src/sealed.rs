@@ -111,6 +111,15 @@ pub fn write_generation(path: &Path, file: &[u8]) -> Result<()> {
     write_whole(path, file)
 }
 
+/// Puts the older generation in the place of the newer one, which is damaged: the next write then keeps it.
+///
+/// # Errors
+/// If a file cannot be renamed.
+pub fn restore_generation(path: &Path) -> Result<()> {
+    std::fs::rename(previous(path), path)?;
+    sync_folder(path)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -142,6 +151,9 @@ mod tests {
             write_generation(&path, text.as_bytes()).unwrap();
         }
         assert_eq!(std::fs::read(&path).unwrap(), b"third");
+        assert_eq!(std::fs::read(previous(&path)).unwrap(), b"second");
+        restore_generation(&path).unwrap();
+        write_generation(&path, b"fourth").unwrap();
         assert_eq!(std::fs::read(previous(&path)).unwrap(), b"second");
     }
 }

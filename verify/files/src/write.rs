@@ -22,14 +22,14 @@ use std::path::{Path, PathBuf};
 /// ```
 pub fn write_whole(path: &Path, contents: &[u8]) -> Result<()> {
     let mut part = PartFile::create(path)?;
-    part.file().write_all(contents)?;
+    part.write_all(contents)?;
     part.finish()
 }
 
 /// A file that appears under its name when it is complete. Until then it has a random name in the same folder; it is
 /// removed if it is not finished.
 ///
-/// No other file is overwritten and no symbolic link is followed: the new file is created exclusively, and renaming
+/// It is written to as any [`Write`]. No other file is overwritten and no symbolic link is followed: the new file is created exclusively, and renaming
 /// replaces a link instead of following it.
 #[derive(Debug)]
 pub struct PartFile {
@@ -56,11 +56,6 @@ impl PartFile {
         Ok(Self { file, part, target: path.to_owned(), is_finished: false })
     }
 
-    /// The file to write to.
-    pub fn file(&mut self) -> &mut File {
-        &mut self.file
-    }
-
     /// Path of the unfinished file, for programs that write it. It has the extension of the finished one.
     #[must_use]
     pub fn path(&self) -> &Path {
@@ -76,6 +71,16 @@ impl PartFile {
         std::fs::rename(&self.part, &self.target)?;
         self.is_finished = true;
         sync_folder(&self.target)
+    }
+}
+
+impl Write for PartFile {
+    fn write(&mut self, bytes: &[u8]) -> Result<usize> {
+        self.file.write(bytes)
+    }
+
+    fn flush(&mut self) -> Result<()> {
+        self.file.flush()
     }
 }
 
@@ -152,7 +157,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("film.mp4");
         let mut part = PartFile::create(&path).unwrap();
-        part.file().write_all(b"x").unwrap();
+        part.write_all(b"x").unwrap();
         assert!(!path.exists() && part.path().extension() == path.extension());
         part.finish().unwrap();
         drop(PartFile::create(&path).unwrap());
