@@ -7,7 +7,7 @@ use std::ops::Range;
 
 use super::flags::{Flag, Flags};
 use super::narrow::{Evaluated, Search, one_sided};
-use super::ray::{Along, Comparison, Ray};
+use super::ray::{Along, Comparison, Found, Ray};
 use super::real::{Mask, Number};
 use super::series::Limit;
 use super::unbounded::Unbounded;
@@ -38,10 +38,10 @@ pub struct Care<T: Number> {
     pub definite: T::Mask,
 }
 
-/// Rays that are tried first: four opposite pairs.
+/// Rays that are tried first: four opposite pairs. They usually tell a singularity, where each ray has its own results.
 const FEW: usize = 8;
-/// Rays that usually tell a singularity, where each ray has its own results: four more directions.
-const SOME: usize = 12;
+/// Rays that tell one where opposite rays agree: eight more directions.
+const SOME: usize = 16;
 /// The fewest of them that must have results, which other rays may not have: they leave the formula's domain.
 const ENOUGH: usize = 5;
 /// Rays that tell a kink, where derivatives have some values, from a singularity.
@@ -186,22 +186,24 @@ impl<'a> Rays<'a> {
     /// Evaluates more rays, up to this number.
     fn cast(&mut self, rays: usize) {
         let moves = self.roles.moves;
-        for ray in self.paths.len()..rays {
+        let slopes = |ray: usize| {
             let slope = |(i, &moves): (usize, &bool)| if moves { slope(ray, i) } else { 0.0 };
-            self.cast_along(moves.iter().enumerate().map(slope).collect());
-        }
+            moves.iter().enumerate().map(slope).collect()
+        };
+        self.cast_along((self.paths.len()..rays).map(slopes).collect());
     }
 
-    fn cast_along(&mut self, slopes: Vec<f64>) {
+    fn cast_along(&mut self, slopes: Vec<Vec<f64>>) {
         let Roles { groups, values_first, .. } = self.roles;
-        let found = Ray::evaluate(&self.inputs, &slopes, self.along);
         let values = if values_first { groups[0] } else { 0 };
         let is_inside = |limits: &Vec<Limit>| !limits[..values].iter().any(|value| matches!(value, Limit::Unknown));
-        self.is_outside &= found.limits.as_ref().is_some_and(|limits| !is_inside(limits));
-        // If the value is undefined, so are its derivatives.
-        let limits = found.limits.filter(is_inside);
-        let limits = limits.unwrap_or_else(|| vec![Limit::Unknown; groups.iter().sum()]);
-        self.paths.push(Path { slopes, comparisons: found.comparisons, limits });
+        let found = Ray::evaluate(&self.inputs, &slopes, self.along);
+        for (slopes, Found { limits, comparisons }) in slopes.into_iter().zip(found) {
+            self.is_outside &= limits.as_ref().is_some_and(|limits| !is_inside(limits));
+            // If the value is undefined, so are its derivatives.
+            let limits = limits.filter(is_inside).unwrap_or_else(|| vec![Limit::Unknown; groups.iter().sum()]);
+            self.paths.push(Path { slopes, comparisons, limits });
+        }
     }
 
     fn agree(&self) -> bool {
@@ -221,7 +223,7 @@ impl<'a> Rays<'a> {
     fn is_scattered(&self, result: usize, scale: Unbounded<f64>) -> bool {
         let is_infinite = |path: &Path| matches!(path.limits[result], Limit::Infinite(_));
         let (numbers, sides) = (self.numbers(result).count(), self.sides(result, scale).len());
-        // An even function has one result for two opposite directions: eight different ones for twelve rays.
+        // An even function has one result for two opposite directions: twelve different ones for sixteen rays.
         self.paths.iter().any(is_infinite) || numbers >= ENOUGH && 3 * sides >= 2 * numbers
     }
 
@@ -239,23 +241,19 @@ impl<'a> Rays<'a> {
     /// Looks for rays into narrow regions where the formula takes another branch, with other results.
     fn cast_into_narrow_regions(&mut self) {
         let rays: Vec<Evaluated<'_>> = self.paths.iter().map(Path::evaluated).collect();
-        let found =
-            one_sided(&rays).into_iter().filter(|comparisons| self.matter(comparisons)).find_map(|comparisons| {
-                let (inputs, moves) = (&self.inputs[..], self.roles.moves);
-                let found = Search { inputs, moves, along: self.along, comparison: comparisons[0] }.run(&rays);
-                let differs = |slopes: &Vec<f64>| !self.has_results(Ray::evaluate(inputs, slopes, self.along).limits);
-                found.iter().any(differs).then_some(found)
-            });
+        let (inputs, moves) = (&self.inputs[..], self.roles.moves);
+        let differ = |found: Vec<Found>| found.into_iter().map(|ray| !self.has_results(ray.limits)).collect::<Vec<_>>();
+        let comparisons = one_sided(&rays);
+        let matter = differ(Ray::evaluate_reversed(&comparisons, inputs, &self.paths[0].slopes, self.along));
+        let mut important = comparisons.iter().zip(matter).filter(|(_, matters)| *matters);
+        let found = important.find_map(|(comparisons, _)| {
+            let found = Search { inputs, moves, along: self.along, comparison: comparisons[0] }.run(&rays);
+            differ(Ray::evaluate(inputs, &found, self.along)).contains(&true).then_some(found)
+        });
         if let Some(found) = found {
             self.cast(MANY);
-            found.into_iter().for_each(|slopes| self.cast_along(slopes));
+            self.cast_along(found);
         }
-    }
-
-    /// Returns whether results change if comparisons have the other outcome.
-    fn matter(&self, comparisons: &[usize]) -> bool {
-        let reversed = Ray::evaluate_reversed(comparisons, &self.inputs, &self.paths[0].slopes, self.along);
-        !self.has_results(reversed.limits)
     }
 
     /// Returns whether limits are those of the first ray, or do not exist because the formula is degenerate.
@@ -276,9 +274,11 @@ impl<'a> Rays<'a> {
         if self.agree() {
             self.cast_into_narrow_regions();
         } else {
-            self.cast(SOME);
-            if !self.are_scattered() {
-                self.cast(MANY);
+            for rays in [SOME, MANY] {
+                if self.are_scattered() {
+                    break;
+                }
+                self.cast(rays);
             }
         }
         let mut settled = Vec::with_capacity(plain.len());
@@ -445,6 +445,7 @@ pub(super) fn slope(ray: usize, input: usize) -> f64 {
 mod tests {
     use super::*;
     use crate::numbers::level::Baseline;
+    use crate::numbers::outcomes::Outcomes;
 
     type Formula = fn(&[Ray]) -> Vec<Ray>;
 
@@ -452,10 +453,11 @@ mod tests {
     fn at_zero(values: usize, formula: Formula) -> (Vec<f64>, (bool, bool)) {
         let inputs = [Unbounded::<f64>::of(0.0); 2];
         let results = formula(&[0, 1].map(|_| Ray::from_f64(0.0))).len();
+        let along = |rays: &[Ray]| (formula(rays), Outcomes::none());
         let mut results = vec![Unbounded::of(f64::NAN); results];
         let groups = [values, results.len() - values];
         let roles = Roles { moves: &[true, true], groups: &groups, values_first: true, is_energy: true };
-        let flags = settle(&inputs, roles, &mut results, suspected(Flags::clear()), &|rays| Some(formula(rays)));
+        let flags = settle(&inputs, roles, &mut results, suspected(Flags::clear()), &along);
         (results.into_iter().map(Unbounded::to_scalar).collect(), (flags.degenerate, flags.kink))
     }
 
@@ -494,7 +496,7 @@ mod tests {
         let care = suspected(Flags { degenerate: true, kink: true });
         let mut results = [Unbounded::of(3.0), Unbounded::of(0.0)];
         let roles = Roles { moves: &[true], groups: &[1, 1], values_first: true, is_energy: true };
-        let along = |x: &[Ray]| Some(vec![Ray::from_f64(3.0), x[0] * Ray::from_f64(2.0)]);
+        let along = |x: &[Ray]| (vec![Ray::from_f64(3.0), x[0] * Ray::from_f64(2.0)], Outcomes::none());
         let flags = settle(&[Unbounded::of(0.0)], roles, &mut results, care, &along);
         assert!(!flags.any() && results.map(Unbounded::to_scalar) == [3.0, 0.0]);
     }
@@ -504,16 +506,17 @@ mod tests {
         let care = suspected(Flags::clear());
         let mut results = [Unbounded::of(f64::NAN)];
         let roles = Roles { moves: &[true], groups: &[1], values_first: true, is_energy: true };
-        let flags = settle(&[Unbounded::of(f64::NAN)], roles, &mut results, care, &|_| None);
+        let never = |_: &[Ray]| -> (Vec<Ray>, Outcomes) { unreachable!("no ray is needed") };
+        let flags = settle(&[Unbounded::of(f64::NAN)], roles, &mut results, care, &never);
         assert!(flags.degenerate && results[0].to_scalar().is_nan());
         let mut large = [Unbounded::of(1e200) * Unbounded::of(1e200)];
-        let flags = settle(&[Unbounded::of(1e200)], roles, &mut large, care, &|_| None);
+        let flags = settle(&[Unbounded::of(1e200)], roles, &mut large, care, &never);
         assert!(flags.degenerate && large[0].to_scalar() == f64::INFINITY);
     }
 
     #[test]
     fn without_a_domain_or_a_limit_no_ray_is_needed() {
-        let never = |_: &[Ray]| -> Option<Vec<Ray>> { unreachable!("no ray is needed") };
+        let never = |_: &[Ray]| -> (Vec<Ray>, Outcomes) { unreachable!("no ray is needed") };
         let roles = Roles { moves: &[true], groups: &[1, 2], values_first: true, is_energy: true };
         let settled = |care, is_energy| {
             let mut results = [f64::NAN, f64::NAN, 3.0].map(Unbounded::<f64>::of);

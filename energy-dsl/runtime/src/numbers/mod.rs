@@ -2,6 +2,7 @@
 //! exponent.
 
 mod block_sum;
+mod bundle;
 mod cpu;
 mod elementary;
 mod flags;
@@ -10,8 +11,10 @@ mod lane;
 mod level;
 mod limits;
 mod narrow;
+mod outcomes;
 mod ray;
 mod real;
+mod rows;
 mod series;
 mod unbounded;
 

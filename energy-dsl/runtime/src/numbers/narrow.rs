@@ -6,6 +6,7 @@
 
 use std::cmp::Ordering;
 
+use super::outcomes::LANES;
 use super::ray::{Along, Comparison, Ray};
 use super::series::Term;
 use super::unbounded::Unbounded;
@@ -98,43 +99,40 @@ impl Search<'_> {
     }
 
     fn at(&self, slopes: Vec<f64>) -> Point {
-        let comparisons = Ray::compare(self.inputs, &slopes, self.along);
-        Point { difference: comparisons.get(self.comparison).copied().flatten(), slopes }
+        self.at_each(vec![slopes]).remove(0)
+    }
+
+    fn at_each(&self, rays: Vec<Vec<f64>>) -> Vec<Point> {
+        let comparisons = Ray::compare(self.inputs, &rays, self.along);
+        let point = |(slopes, comparisons): (Vec<f64>, Vec<Comparison>)| Point {
+            difference: comparisons.get(self.comparison).copied().flatten(),
+            slopes,
+        };
+        rays.into_iter().zip(comparisons).map(point).collect()
     }
 
     fn moving(&self) -> impl Iterator<Item = usize> {
         (0..self.moves.len()).filter(|&i| self.moves[i])
     }
 
-    /// Makes the difference smaller until it has the other sign: a pattern search with a step per slope.
+    /// Makes the difference smaller until it has the other sign: a pattern search with a step per slope. The slopes of a
+    /// bundle of rays are changed at once, both up and down.
     fn descend(&self, start: Point, is_other: &dyn Fn(&Point) -> bool) -> Point {
         let mut best = start;
         let mut steps: Vec<(usize, f64)> = self.moving().map(|i| (i, 0.5)).collect();
         let mut evaluations = 0;
         while evaluations < EVALUATIONS && steps.iter().any(|&(_, step)| step.abs() > NARROWEST) {
             let before = best.slopes.clone();
-            for (i, step) in &mut steps {
-                let mut is_inert = true;
-                let mut is_better = false;
-                for sign in [1.0, -1.0] {
-                    let mut slopes = best.slopes.clone();
-                    slopes[*i] += sign * *step;
-                    let found = self.at(slopes);
-                    evaluations += 1;
-                    if is_other(&found) {
-                        return found;
-                    }
-                    is_better = is_smaller(&found, &best);
-                    is_inert &= !is_better && !is_smaller(&best, &found);
-                    if is_better {
-                        best = found;
-                        *step *= 1.5 * sign;
-                        break;
-                    }
+            for steps in steps.chunks_mut(LANES / 2) {
+                let tried = self.at_each(steps.iter().flat_map(|&(i, step)| beside(&best.slopes, i, step)).collect());
+                evaluations += tried.len();
+                if let Some(found) = tried.iter().find(|point| is_other(point)) {
+                    return found.clone();
                 }
-                if !is_better {
-                    *step *= if is_inert { 0.0 } else { 0.4 };
+                for ((_, step), pair) in steps.iter_mut().zip(tried.as_chunks::<2>().0) {
+                    *step *= next_step(&best, pair);
                 }
+                best = tried.into_iter().fold(best, |best, found| if is_smaller(&found, &best) { found } else { best });
             }
             steps.retain(|&(_, step)| step != 0.0);
             // Steps along a valley: once more what the whole round moved.
@@ -167,9 +165,28 @@ impl Search<'_> {
                 true => slope + distance * super::limits::slope(1000 + number, i),
                 false => 0.0,
             });
-            self.at(moved.collect())
+            moved.collect()
         };
-        NEAR.iter().enumerate().map(ray).collect()
+        self.at_each(NEAR.iter().enumerate().map(ray).collect())
+    }
+}
+
+/// Returns slopes of which one is changed by a step, up and down.
+fn beside(slopes: &[f64], i: usize, step: f64) -> [Vec<f64>; 2] {
+    [step, -step].map(|step| {
+        let mut changed = slopes.to_vec();
+        changed[i] += step;
+        changed
+    })
+}
+
+/// Returns the factor of the next step of a slope, which was changed up and down: 0 if it does not matter.
+fn next_step(best: &Point, [up, down]: &[Point; 2]) -> f64 {
+    match [up, down].map(|tried| is_smaller(tried, best)) {
+        [true, _] => 1.5,
+        [_, true] => -1.5,
+        _ if is_smaller(best, up) || is_smaller(best, down) => 0.4,
+        _ => 0.0,
     }
 }
 
@@ -184,7 +201,8 @@ fn is_smaller(a: &Point, b: &Point) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::numbers::{Care, Flags, Number, Roles, settle};
+    use crate::numbers::outcomes::Outcomes;
+    use crate::numbers::{Care, Flags, Mask, Number, Roles, settle};
 
     /// Returns whether a value with one derivative is marked as a kink at 0, where the derivative is 1.
     fn is_kink(inputs: usize, formula: impl Fn(&[Ray]) -> Vec<Ray>) -> bool {
@@ -192,7 +210,8 @@ mod tests {
         let flags = Flags { degenerate: false, kink: true };
         let care = Care { flags, outside: false, definite: false };
         let roles = Roles { moves: &vec![true; inputs], groups: &[1, 1], values_first: true, is_energy: true };
-        let flags = settle(&vec![Unbounded::of(0.0); inputs], roles, &mut results, care, &|x| Some(formula(x)));
+        let flags =
+            settle(&vec![Unbounded::of(0.0); inputs], roles, &mut results, care, &|x| (formula(x), Outcomes::none()));
         assert!(!flags.degenerate && results[1].to_scalar() == 1.0);
         flags.kink
     }
@@ -202,7 +221,7 @@ mod tests {
     }
 
     /// Returns a value with the slope 1 or, where the condition holds, with another one.
-    fn bent(x: &[Ray], condition: bool, slope: f64) -> Vec<Ray> {
+    fn bent(x: &[Ray], condition: Outcomes, slope: f64) -> Vec<Ray> {
         let slope = Ray::select(condition, Ray::from_f64(slope), Ray::from_f64(1.0));
         vec![slope * x[0], slope]
     }

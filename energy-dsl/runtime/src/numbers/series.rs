@@ -11,7 +11,7 @@ use super::unbounded::Unbounded;
 type Factor = Unbounded<f64>;
 
 /// Terms that a series keeps at first, and if these do not determine a limit.
-pub(super) const LENGTHS: [usize; 2] = [4, 10];
+pub(super) const LENGTHS: [usize; 2] = [3, 10];
 
 thread_local! {
     /// Terms that a series keeps.
@@ -29,8 +29,13 @@ pub(super) fn with_length<R>(length: usize, evaluate: impl FnOnce() -> R) -> (R,
     (result, IS_SHORT.get())
 }
 
+/// Returns the number of terms that a series keeps.
+pub(super) fn length() -> usize {
+    LENGTH.get()
+}
+
 /// A sum this small against everything that it was computed from is rounding: its terms cancel.
-const CANCELLED: f64 = 1e-12;
+pub(super) const CANCELLED: f64 = 1e-12;
 /// Powers that differ by less are equal.
 const SAME: f64 = 1e-9;
 /// Terms further apart than this many whole powers are sorted.
@@ -41,36 +46,47 @@ const BEYOND: f64 = 1e6;
 /// The order of magnitude ε^power · ln(1/ε)^logs.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Order {
-    power: f64,
-    logs: f64,
+    pub(super) power: f64,
+    pub(super) logs: f64,
 }
 
 impl Order {
-    const ONE: Self = Self { power: 0.0, logs: 0.0 };
+    pub(super) const ONE: Self = Self { power: 0.0, logs: 0.0 };
     /// Smaller than everything: the first unknown term of an exact series.
-    const NEVER: Self = Self { power: f64::INFINITY, logs: 0.0 };
+    pub(super) const NEVER: Self = Self { power: f64::INFINITY, logs: 0.0 };
     /// Larger than everything: of such a series nothing is known.
     const ALWAYS: Self = Self { power: f64::NEG_INFINITY, logs: 0.0 };
 
     /// Compares magnitudes; the larger one comes first.
-    fn compare(self, other: Self) -> Ordering {
+    pub(super) fn compare(self, other: Self) -> Ordering {
         let by = |a: f64, b: f64| if (a - b).abs() < SAME || a == b { Ordering::Equal } else { a.total_cmp(&b) };
         by(self.power, other.power).then(by(other.logs, self.logs))
     }
 
-    fn is_larger_than(self, other: Self) -> bool {
+    pub(super) fn is_larger_than(self, other: Self) -> bool {
         self.compare(other) == Ordering::Less
     }
 
-    fn larger(self, other: Self) -> Self {
+    /// Returns the order this many whole powers of ε smaller.
+    pub(super) fn after(self, steps: usize) -> Self {
+        Self { power: self.power + steps as f64, ..self }
+    }
+
+    /// Returns whether orders differ by a whole power of ε.
+    pub(super) fn is_in_steps_from(self, other: Self) -> bool {
+        let step = self.power - other.power;
+        self.logs == other.logs && step == step.round() && step.abs() <= MOST_STEPS
+    }
+
+    pub(super) fn larger(self, other: Self) -> Self {
         if other.is_larger_than(self) { other } else { self }
     }
 
-    fn times(self, other: Self) -> Self {
+    pub(super) fn times(self, other: Self) -> Self {
         Self { power: self.power + other.power, logs: self.logs + other.logs }
     }
 
-    fn raised(self, exponent: f64) -> Self {
+    pub(super) fn raised(self, exponent: f64) -> Self {
         Self { power: self.power * exponent, logs: self.logs * exponent }
     }
 }
@@ -88,6 +104,20 @@ pub(super) struct Term {
 impl Term {
     fn exact(order: Order, factor: Factor) -> Self {
         Self { order, factor, doubt: 1.0 }
+    }
+
+    pub(super) fn of(order: Order, by: f64, doubt: f64) -> Self {
+        Self { order, factor: factor(by), doubt }
+    }
+
+    pub(super) fn order(self) -> Order {
+        self.order
+    }
+
+    /// Returns the factor and the size of its largest summand, if doubles have them.
+    pub(super) fn plain(self) -> Option<(f64, f64)> {
+        let plain = self.factor.to_scalar();
+        plain.is_normal().then_some((plain, plain.abs() * self.doubt))
     }
 
     /// Returns whether the term is negative.
@@ -153,12 +183,25 @@ impl Series {
         Self::of(vec![term(0.0, x), term(1.0, factor(slope))], Order::NEVER)
     }
 
-    fn undefined() -> Self {
+    pub(super) fn undefined() -> Self {
         Self { terms: Vec::new(), unknown: Order::ALWAYS }
     }
 
+    pub(super) fn terms(&self) -> &[Term] {
+        &self.terms
+    }
+
+    pub(super) fn is_exact(&self) -> bool {
+        self.unknown.power == f64::INFINITY
+    }
+
+    /// Returns the order of the first unknown term.
+    pub(super) fn unknown(&self) -> Order {
+        self.unknown
+    }
+
     /// Sorts terms, adds those of one order, and drops those that are zero or unknown.
-    fn of(mut terms: Vec<Term>, unknown: Order) -> Self {
+    pub(super) fn of(mut terms: Vec<Term>, unknown: Order) -> Self {
         terms.sort_by(|a, b| a.order.compare(b.order));
         Self::sorted(terms, unknown)
     }

@@ -427,7 +427,7 @@ fn of_one<W: WithCare<INPUTS, OUTPUTS>, T: Real, const INPUTS: usize, const OUTP
     let (mut results, care) = T::Unbounded::run_with_care::<W, INPUTS, OUTPUTS>(inputs);
     let along = |rays: &[Ray]| {
         let (results, care) = (W::compiled().ray)(rays.try_into().expect("as many rays as inputs"));
-        (!care.flags.degenerate).then(|| results.to_vec())
+        (results.to_vec(), care.flags.degenerate)
     };
     let flags = settle(inputs, W::ROLES, &mut results, care, &along);
     (results, flags)

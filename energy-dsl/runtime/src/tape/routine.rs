@@ -159,7 +159,7 @@ impl General {
         let (mut results, care) = self.at(inputs);
         let along = |rays: &[Ray]| {
             let (results, care) = self.at(rays);
-            (!care.flags.degenerate).then_some(results)
+            (results, care.flags.degenerate)
         };
         let flags = settle(inputs, roles, &mut results, care, &along);
         (results, flags)
