@@ -265,4 +265,14 @@ fn a_sweep_of_a_billion_runs_is_refused() {
         assert!(sweep(values).contains("expected a regular file"));
     }
     assert!(!path.join("runs").exists());
+    // A folder of a run that leads elsewhere.
+    std::fs::write(path.join("values.toml"), "drag = [0.5]").unwrap();
+    done(&["sweep", "scene.toml", "values.toml", "-o", "runs"], path);
+    let run =
+        path.join("runs").read_dir().unwrap().map(|entry| entry.unwrap().path()).find(|run| run.is_dir()).unwrap();
+    std::fs::rename(&run, path.join("elsewhere")).unwrap();
+    std::fs::remove_file(path.join("elsewhere/sweep.done")).unwrap();
+    symlink(path.join("elsewhere"), &run).unwrap();
+    refused(&["sweep", "scene.toml", "values.toml", "-o", "runs"], path);
+    assert!(!path.join("elsewhere/sweep.done").exists());
 }

@@ -8,7 +8,7 @@ use std::process::ExitCode;
 
 use anyhow::Result;
 use clap::{Parser, Subcommand};
-use cli::session::Ended;
+use cli::session::{Ended, begin};
 use energy_cli::Interrupts;
 
 /// Tracks a deforming body in depth images.
@@ -54,7 +54,7 @@ fn obey(command: Command) -> Result<ExitCode> {
         Command::Pose(pose) => pose.run(),
         Command::Evaluate(evaluate) => evaluate.run().map(drop),
         Command::Demo(demo) => return until_signal(|interrupts| demo.run(interrupts)),
-        Command::Track(track) => return until_signal(|interrupts| track.run(interrupts)),
+        Command::Track(track) => return until_signal(|interrupts| begin(&track, interrupts)),
         Command::Resume(resume) => return until_signal(|interrupts| resume.run(interrupts)),
     }
     .map(|()| ExitCode::SUCCESS)

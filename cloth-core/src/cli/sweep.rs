@@ -99,7 +99,8 @@ impl Sweep {
         self.allowed
             .check(&choice.text, &self.scene)
             .map_err(|error| anyhow!(with_line(&choice.text, &error.to_string())))?;
-        let folder = self.output.join(&choice.name);
+        // A symbolic link in its place would lead elsewhere.
+        let folder = energy_files::subfolder(&self.output, &choice.name)?;
         let done = folder.join(DONE);
         if done.symlink_metadata().is_ok_and(|done| done.is_file()) {
             return Ok(());

@@ -8,7 +8,7 @@ use fusion_core::skeleton::BoneNoise;
 use super::evaluate::{Evaluate, summary};
 use super::print;
 use super::render::Render;
-use super::session::Ended;
+use super::session::{Ended, begin};
 use super::track::Track;
 
 /// The largest number of frames of a demonstration: half an hour.
@@ -39,7 +39,7 @@ impl Demo {
             let folder = self.output.join(name.replace(' ', "-"));
             let (recording, track) = (folder.join("recording"), folder.join("track"));
             Render::figure(self.frames, noise, &recording).run_until(interrupts.flag())?;
-            if Track::of(&recording, unknown_bones, &track).run(interrupts)? == Ended::Stopped {
+            if begin(&Track::of(&recording, unknown_bones, &track), interrupts)? == Ended::Stopped {
                 return Ok(Ended::Stopped);
             }
             rows.push((name, Evaluate::of(&recording, &track).run()?));

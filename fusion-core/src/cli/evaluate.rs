@@ -91,7 +91,7 @@ impl Evaluate {
         }
         let film = self.track.join(FILM);
         if film.exists() {
-            let png = energy_files::read(&film, LARGEST_FILM).with_context(|| film.display().to_string())?;
+            let png = energy_files::read_state(&film, LARGEST_FILM).with_context(|| film.display().to_string())?;
             shown.push(Shown { caption: "all frames".into(), png });
         }
         Ok(shown)

@@ -21,6 +21,17 @@ use super::track_output::TrackOutput;
 /// The time between two checkpoints: at most so much work is lost if the program is killed.
 const BETWEEN_CHECKPOINTS: Duration = Duration::from_secs(5);
 
+/// Tracks all frames, or until a signal. Then the frames so far are written, and `fusion resume` continues.
+///
+/// # Errors
+/// If an input cannot be used, or no image could be tracked. In the latter case the table of frames has the reasons.
+pub fn begin(track: &Track, interrupts: &Interrupts) -> Result<Ended> {
+    let inputs = track.inputs()?;
+    let _lock = track.prepare()?;
+    let journal = Journal::create(&track.absolute()?)?;
+    Session::new(track, inputs, journal)?.go(interrupts)
+}
+
 /// A track with its output.
 pub struct Session<'a> {
     track: &'a Track,

@@ -2,7 +2,8 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
 use clap::Args;
-use energy_cli::{Interrupts, tell};
+use energy_cli::tell;
+use energy_files::FolderLock;
 use fusion_core::body::{Bone, SkinnedBody};
 use fusion_core::depth::{DepthSequence, GivenCamera};
 use fusion_core::energy::BoneMode;
@@ -18,9 +19,7 @@ use super::folder::{
     CHECKPOINT, FILM, FRAMES, GLTF, JOURNAL, MESHES, MODEL, NODES, PICTURES, PREVIOUS_CHECKPOINT, SKELETON, SURFACE,
     USD, prepare,
 };
-use super::journal::Journal;
 use super::posed::read_any_body;
-use super::session::{Ended, Session};
 use super::track_output::TrackOutput;
 
 /// Files of a track, besides those in its folders.
@@ -133,16 +132,9 @@ impl Track {
         }
     }
 
-    /// Tracks all frames, or until a signal. Then the frames so far are written, and `fusion resume` continues.
-    ///
-    /// # Errors
-    /// If an input cannot be used, or no image could be tracked. In the latter case the table of frames has the
-    /// reasons.
-    pub fn run(&self, interrupts: &Interrupts) -> Result<Ended> {
-        let inputs = self.inputs()?;
-        let _lock = prepare(&self.output, &self.subfolders(), &FILES, self.overwrite)?;
-        let journal = Journal::create(&self.absolute()?)?;
-        Session::new(self, inputs, journal)?.go(interrupts)
+    /// Creates and locks the output folder, and removes the files of an earlier track if that is allowed.
+    pub fn prepare(&self) -> Result<Option<FolderLock>> {
+        prepare(&self.output, &self.subfolders(), &FILES, self.overwrite)
     }
 
     /// Reads and checks all inputs.
@@ -174,7 +166,7 @@ impl Track {
     }
 
     /// Returns the same options with absolute paths, so that the track can be resumed from elsewhere.
-    fn absolute(&self) -> Result<Self> {
+    pub fn absolute(&self) -> Result<Self> {
         let absolute = |path: &Path| std::path::absolute(path).with_context(|| path.display().to_string());
         let optional = |path: &Option<PathBuf>| path.as_deref().map(absolute).transpose();
         Ok(Self {

@@ -3,8 +3,8 @@ use std::path::{Path, PathBuf};
 use energy_files::excerpt;
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 
-/// The largest file, in bytes: a day of motion at 30 Hz.
-const LARGEST_FILE: u64 = 1 << 30;
+/// The largest file, in bytes: hours of motion at 30 Hz.
+const LARGEST_FILE: u64 = 256 << 20;
 /// The largest number in a file, in degrees or its unit of length. Products of larger ones may overflow.
 const LARGEST_NUMBER: f64 = 1e9;
 
