@@ -5,6 +5,7 @@ mod accuracy;
 mod broken_elements;
 mod claims;
 mod elementary_functions;
+mod foreign_potentials;
 mod functions;
 mod near_singularities;
 mod printed_mistakes;

@@ -114,7 +114,7 @@ const DIRECTIONS: [[f64; 9]; 10] = [
 const DIGITS: usize = 70;
 
 /// Value, gradient and Hessian.
-type Blocks = [Vec<f64>; 3];
+pub(crate) type Blocks = [Vec<f64>; 3];
 
 /// A point x with the formula moved from it.
 struct Place<'a> {
@@ -212,7 +212,7 @@ fn spread_between(a: &[f64], b: &[f64]) -> f64 {
 
 /// Limit of a block along all directions.
 #[derive(Debug)]
-enum Limit {
+pub(crate) enum Limit {
     Numbers(Vec<f64>),
     /// Directions differ.
     None,
@@ -229,7 +229,7 @@ fn spread(block: usize, found: &[Blocks]) -> f64 {
     (0..found[0][block].len()).map(of_entry).fold(0.0, f64::max)
 }
 
-fn limit(block: usize, found: &[Blocks]) -> Limit {
+pub(crate) fn limit(block: usize, found: &[Blocks]) -> Limit {
     let largest = found.iter().flat_map(|blocks| &blocks[block]).fold(0.0_f64, |largest, x| largest.max(x.abs()));
     if largest > 1e25 {
         return Limit::None;

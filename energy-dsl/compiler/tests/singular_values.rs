@@ -107,6 +107,19 @@ fn conditions_may_depend_on_one_singular_value() {
     agree("(if s[1] <= 1 { s[0]^4 + 0 * s[1] } else { 0 })", "s[0]^4", &[slack]);
 }
 
+/// A singular value of 0 is below the limit, where its derivative does not matter.
+#[test]
+fn smaller_and_larger_values_are_branches() {
+    let formula = "(max(s[0] - 1, 0)^3 + max(s[1] - 1, 0)^3 + max(s[2] - 1, 0)^3)";
+    for spectrum in [[1.5, 1.5, 0.0], [1.5, 0.5, -0.5], [0.5, 0.5, -0.5], [0.0, 0.0, 0.0]] {
+        assert_eq!(flags(formula, spectrum), [false, false], "{spectrum:?}");
+    }
+    let matrices = [[1.5, 1.5, 0.0], [1.5, 0.5, 0.0]].map(|spectrum| turned(spectrum)[..2].to_vec());
+    let both = "(s[0]^4 + s[1]^4)";
+    agree(&format!("min({both}, 100)"), both, &matrices);
+    assert!(flags("max(s[0] - 1, 0)^3", [1.5, 1.5, 0.5])[0]);
+}
+
 #[test]
 fn a_branch_without_symmetry_is_flagged_where_it_is_taken() {
     let formula = "(if s[0] > 2 { s[0]^2 } else { s[0]^2 + s[1]^2 + s[2]^2 })";

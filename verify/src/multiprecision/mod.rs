@@ -22,5 +22,5 @@ use dashu::Float;
 use rug::Float;
 
 pub use truth::worse;
-pub use truth::{TrueBlock, truth};
+pub use truth::{TrueBlock, truth, truth_beside};
 pub(crate) use truth::{Truth, truth_of_extreme, truth_of_ordinary};

@@ -92,6 +92,20 @@ pub fn truth(declaration: &Declaration, formula: &Textbook, sample: &Sample, dig
     at_rising_precision(digits, Zeros::Confirmed, HIGHEST, || blocks_over(declaration, formula, sample)).blocks
 }
 
+/// Computes every block at the sum of an input and an offset, such as a point of a ray through a singularity. Doubles
+/// need not represent the sum. A block that comes out as zero is taken as exactly zero.
+#[must_use]
+pub fn truth_beside(
+    declaration: &Declaration,
+    formula: &Textbook,
+    sample: &Sample,
+    offset: &Sample,
+    digits: usize,
+) -> Vec<TrueBlock> {
+    let blocks = || blocks_near(declaration, formula, sample, offset);
+    at_rising_precision(digits, Zeros::Believed, HIGHEST, blocks).blocks
+}
+
 /// Computes every block at an input without total cancellation: a block that comes out as zero is taken as exactly
 /// zero.
 pub(crate) fn truth_of_ordinary(

@@ -177,6 +177,10 @@ fn mul(g: &mut Graph, args: &[Lowered]) -> Lowered {
                     parts.push(inner_product(g, &row, &column));
                 }
             }
+            if is_transpose(a, b) {
+                let column = |j: usize| (0..inner).map(|i| b.at(i, j)).collect();
+                g.note_origin(&parts, Origin::Gram { columns: (0..columns).map(column).collect() });
+            }
             match b.shape {
                 Shape::Vector(_) if rows == 1 => Lowered::scalar(parts[0]),
                 Shape::Vector(_) => Lowered::vector(parts),
@@ -184,6 +188,12 @@ fn mul(g: &mut Graph, args: &[Lowered]) -> Lowered {
             }
         }
     }
+}
+
+/// Returns whether a matrix is the transpose of another one.
+fn is_transpose(a: &Lowered, b: &Lowered) -> bool {
+    let ((rows, columns), Shape::Matrix(..)) = (a.dimensions(), b.shape) else { return false };
+    b.dimensions() == (columns, rows) && (0..rows).all(|i| (0..columns).all(|j| a.at(i, j) == b.at(j, i)))
 }
 
 /// Recognises a · x⁻ⁿ, which is a quotient.

@@ -62,7 +62,8 @@ pub(super) const FUNCTIONS: &[Function] = &[
     Function {
         name: "det",
         usage: "det(A)",
-        docs: "Determinant of a 2×2, 3×3 or 4×4 matrix.",
+        docs: "Determinant of a 2×2, 3×3 or 4×4 matrix. That of `transpose(F) * F` is computed from F without \
+               cancellation, as ‖a × b‖² or det(F)².",
         shape: square_to_scalar,
         lower: det,
         accuracy: "",
@@ -352,10 +353,32 @@ fn det(g: &mut Graph, a: &[Lowered]) -> Lowered {
 }
 
 fn determinant(g: &mut Graph, a: &Lowered, cofactors: &[NodeId]) -> NodeId {
+    if let Some(Origin::Gram { columns }) = g.origin(&a.parts).cloned()
+        && let Some(determinant) = gram_determinant(g, &columns)
+    {
+        return determinant;
+    }
     let n = a.dimensions().0;
     let value = g.dot(&a.parts[..n], &cofactors[..n]);
     g.note_determinant(value);
     value
+}
+
+/// Returns det(FᵀF) without cancellation, ‖a × b‖² or (det F)², for a matrix F with these columns.
+fn gram_determinant(g: &mut Graph, columns: &[Vec<NodeId>]) -> Option<NodeId> {
+    let vectors: Vec<Lowered> = columns.iter().map(|column| Lowered::vector(column.clone())).collect();
+    match (columns.len(), columns[0].len()) {
+        (2, 3) => {
+            let normal = cross(g, &vectors);
+            Some(g.dot(&normal.parts, &normal.parts))
+        }
+        (n, rows) if n == rows => {
+            let matrix = self::columns(g, &vectors);
+            let determinant = det(g, &[matrix]).node();
+            Some(g.mul(determinant, determinant))
+        }
+        _ => None,
+    }
 }
 
 fn inverse(g: &mut Graph, a: &[Lowered]) -> Lowered {

@@ -52,7 +52,8 @@ pub(super) fn without_limit(g: &mut Graph, uses: &Uses) -> Option<NodeId> {
     for (&node, used) in &uses.0 {
         let flags = g.rule(node).map(|rule| rule.flags.clone()).unwrap_or_default();
         for flag in flags.into_iter().filter(|flag| flag.definite && flag.order <= used.order) {
-            masks.insert(g.and(flag.mask, used.mask));
+            let used = if flag.order == 0 { used.mask } else { used.moving };
+            masks.insert(g.and(flag.mask, used));
         }
     }
     masks.into_iter().reduce(|a, b| g.or(a, b))
@@ -63,6 +64,8 @@ pub(super) fn without_limit(g: &mut Graph, uses: &Uses) -> Option<NodeId> {
 struct Use {
     /// Where it is used.
     mask: NodeId,
+    /// Where its derivatives are used.
+    moving: NodeId,
     /// The highest order of its derivatives.
     order: u8,
 }
@@ -73,7 +76,7 @@ pub(super) struct Uses(BTreeMap<NodeId, Use>);
 impl Uses {
     pub(super) fn of(g: &mut Graph, roots: &[(NodeId, u8)]) -> Self {
         let (always, mut uses) = (g.truth(true), Self(BTreeMap::new()));
-        roots.iter().for_each(|&(root, order)| uses.add(g, root, Use { mask: always, order }));
+        roots.iter().for_each(|&(root, order)| uses.add(g, root, Use { mask: always, moving: always, order }));
         let roots: Vec<NodeId> = roots.iter().map(|&(root, _)| root).collect();
         // Operands have smaller numbers than their users.
         for node in operations(g, &roots).into_iter().rev() {
@@ -86,8 +89,18 @@ impl Uses {
                 (None, Op::Select(mask, yes, no)) => {
                     let opposite = g.not(mask);
                     for (branch, taken) in [(yes, mask), (no, opposite)] {
-                        let mask = g.and(used.mask, taken);
-                        uses.add(g, branch, Use { mask, ..used });
+                        let [mask, moving] = [used.mask, used.moving].map(|used| g.and(used, taken));
+                        uses.add(g, branch, Use { mask, moving, ..used });
+                    }
+                }
+                (None, Op::Min(a, b) | Op::Max(a, b)) => {
+                    let is_max = matches!(g.op(node), Op::Max(..));
+                    for (operand, other) in [(a, b), (b, a)] {
+                        // The derivatives of the other operand are taken.
+                        let left = if is_max { g.less(operand, other) } else { g.less(other, operand) };
+                        let taken = g.not(left);
+                        let moving = g.and(used.moving, taken);
+                        uses.add(g, operand, Use { moving, ..used });
                     }
                 }
                 (None, op) => op.operands().for_each(|operand| uses.add(g, operand, used)),
@@ -98,7 +111,9 @@ impl Uses {
 
     fn add(&mut self, g: &mut Graph, node: NodeId, used: Use) {
         let joined = match self.0.get(&node) {
-            Some(&Use { mask, order }) => Use { mask: g.or(mask, used.mask), order: order.max(used.order) },
+            Some(&Use { mask, moving, order }) => {
+                Use { mask: g.or(mask, used.mask), moving: g.or(moving, used.moving), order: order.max(used.order) }
+            }
             None => used,
         };
         self.0.insert(node, joined);

@@ -20,7 +20,7 @@ use crate::functions::Lowered;
 use crate::graph::{Dependence, Graph, NodeId, Primitive, Rule, Spectrum};
 use energy_runtime::Flag;
 use reflection::{DividedDifference, Reflection};
-use symmetry::{Branches, conditions};
+use symmetry::{Branches, conditions, with_selections};
 
 /// Singular values closer than this part of the largest one are equal up to rounding.
 const ROUNDING: f64 = 4e-15;
@@ -72,6 +72,7 @@ struct Mode {
 /// Returns ψ as a rule of the entries of F.
 fn rule(g: &mut Graph, psi: NodeId, index: usize) -> NodeId {
     let spectrum = g.spectra()[index].clone();
+    let psi = with_selections(g, psi, &spectrum.values);
     let Spectrum { matrix, values, left, right, .. } = &spectrum;
     let coordinates = Coordinates::of_nodes(g, values);
     let slopes = first_derivatives(g, &[psi], &coordinates, Order::First).remove(0);

@@ -50,21 +50,43 @@ impl Branches {
 
 /// Returns the moving conditions of the selections in a formula, seen from outside of robust primitives.
 pub(super) fn conditions(g: &Graph, psi: NodeId) -> Vec<NodeId> {
-    let (mut found, mut seen, mut stack) = (BTreeSet::new(), BTreeSet::new(), vec![psi]);
+    let condition = |node| match g.op(node) {
+        Op::Select(mask, ..) => Some(mask),
+        _ => None,
+    };
+    let found: BTreeSet<NodeId> = operations(g, psi).into_iter().filter_map(condition).collect();
+    found.into_iter().filter(|&mask| g.varies(mask)).collect()
+}
+
+/// Returns the formula of singular values with selections for smaller and larger numbers. Its conditions are then those
+/// of all branches.
+pub(super) fn with_selections(g: &mut Graph, psi: NodeId, values: &[NodeId]) -> NodeId {
+    let mut replaced: Vec<(NodeId, NodeId)> = values.iter().map(|&value| (value, value)).collect();
+    // Operands have smaller numbers than their users.
+    for node in operations(g, psi) {
+        let (Op::Min(a, b) | Op::Max(a, b)) = g.op(node) else { continue };
+        let mut copy = Substitution::new(g, replaced.iter().copied());
+        let [a, b] = [a, b].map(|operand| copy.of(g, operand));
+        let [smaller, larger] = if matches!(g.op(node), Op::Min(..)) { [a, b] } else { [b, a] };
+        let is_less = g.less(a, b);
+        replaced.push((node, g.select(is_less, smaller, larger)));
+    }
+    if replaced.len() == values.len() { psi } else { Substitution::new(g, replaced).of(g, psi) }
+}
+
+/// Returns the operations of a formula, seen from outside of robust primitives.
+fn operations(g: &Graph, psi: NodeId) -> BTreeSet<NodeId> {
+    let (mut seen, mut stack) = (BTreeSet::new(), vec![psi]);
     while let Some(node) = stack.pop() {
-        if !seen.insert(node) {
-            continue;
-        }
-        match (g.rule(node), g.op(node)) {
-            (Some(rule), _) => stack.extend(rule.arguments.iter().chain(&rule.inner)),
-            (None, Op::Select(mask, yes, no)) => {
-                stack.extend([yes, no]);
-                found.extend(Some(mask).filter(|&mask| g.varies(mask)));
+        if seen.insert(node) {
+            match (g.rule(node), g.op(node)) {
+                (Some(rule), _) => stack.extend(rule.arguments.iter().chain(&rule.inner)),
+                (None, Op::Select(_, yes, no)) => stack.extend([yes, no]),
+                (None, op) => stack.extend(op.operands()),
             }
-            (None, op) => stack.extend(op.operands()),
         }
     }
-    found.into_iter().collect()
+    seen
 }
 
 /// Returns whether ψ is the same after a reflection, which maps all singular values to images, where the outcomes of
