@@ -269,3 +269,15 @@ fn constants_that_are_infinite_are_written() {
     let code = energy_compiler::compile(source.parse().unwrap()).to_string().replace(' ', "");
     assert!(code.contains("f64::INFINITY"), "{code}");
 }
+
+#[test]
+fn too_many_coordinates_are_refused_before_they_are_differentiated() {
+    let source = |points: usize| {
+        format!("energy A(p: [Point; {points}]) {{ sum(i in 1..{points}, norm_squared(p[i] - p[i - 1])) }}")
+    };
+    assert!(energy_compiler::Interpreted::from_source(&source(85)).is_ok());
+    let refused = energy_compiler::Interpreted::from_source(&source(200)).unwrap_err().to_string();
+    assert!(refused.contains("A moves 600 coordinates") && refused.contains("255 rows"), "{refused}");
+    let residual = "residual R(u: [Scalar; 300]; k: Scalar) { k * u[0] * u[299] + sum(i in 0..300, 0 * u[i]) }";
+    assert!(energy_compiler::Interpreted::from_source(residual).is_ok());
+}

@@ -71,6 +71,14 @@ impl Signature {
         {
             let message = format!("the inputs of {} have more than {MOST_NUMBERS} numbers", declaration.name.text);
             diagnostics.push(Diagnostic::new(&declaration.name.span, message).help("shorten the arrays"));
+        } else if declaration.kind != Kind::Residual && numbers(&signature.moving) > MOST_COORDINATES {
+            let name = &declaration.name.text;
+            let message = format!(
+                "{name} moves {} coordinates, and its derivatives may have {MOST_COORDINATES} rows",
+                numbers(&signature.moving)
+            );
+            let help = "declare a term of few points, and add up its elements over the mesh";
+            diagnostics.push(Diagnostic::new(&declaration.name.span, message).help(help));
         }
         if signature.moving.is_empty() {
             diagnostics.push(
@@ -156,6 +164,9 @@ impl Signature {
 
 /// Maximum count of numbers in an input; more are data.
 const MOST_NUMBERS: usize = 4096;
+
+/// Maximum count of coordinates of an energy, a constraint or a force, whose second derivatives have their square.
+const MOST_COORDINATES: usize = 255;
 
 /// Returns the type of a group of inputs. An array with an invalid length gets length one.
 fn input_type(group: &InputGroup, globals: &Globals, diagnostics: &mut Diagnostics) -> InputType {

@@ -7,9 +7,10 @@ use std::borrow::Cow;
 use std::cell::Cell;
 use std::cmp::Ordering;
 
+use super::coefficients::{Coefficients, Row};
 use super::outcomes::{LANES, Outcomes};
 use super::real::Mask;
-use super::rows::{Coefficients, Row, Rows};
+use super::rows::Rows;
 use super::series::{LENGTHS, Order, Series, Term, length};
 use super::unbounded::Unbounded;
 
@@ -212,7 +213,7 @@ fn rows_of(series: &[(Series, Outcomes)], first: Order, end: Order) -> Option<Ro
                 continue;
             };
             let (factor, size) = term.plain()?;
-            (0..LANES).filter(|&ray| rays.lane(ray)).for_each(|ray| row.set(ray, factor, size));
+            row.set(*rays, factor, size);
             used = used.max(step + 1);
         }
     }
@@ -408,7 +409,7 @@ impl Bundle {
         Self::of((0..rays).map(along).collect())
     }
 
-    /// Returns whether the number is defined along a ray. There are none beyond the last.
+    /// Returns whether the number is defined along a ray. It is not along rays beyond the last.
     pub(super) fn is_defined(&self, ray: usize) -> bool {
         match self {
             Self::Same(series) => series.is_defined(),

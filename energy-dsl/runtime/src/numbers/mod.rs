@@ -3,6 +3,7 @@
 
 mod block_sum;
 mod bundle;
+mod coefficients;
 mod cpu;
 mod elementary;
 mod flags;

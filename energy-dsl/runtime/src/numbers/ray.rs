@@ -264,6 +264,7 @@ impl Number for Ray {
 mod tests {
     use super::*;
     use crate::numbers::level::Baseline;
+    use crate::numbers::limits::slope;
 
     type B = Baseline;
 
@@ -315,6 +316,48 @@ mod tests {
         let (far, near) = (ray(f64::INFINITY, 0.5), ray(2.0, 0.3));
         assert_eq!(limit(far - near), f64::INFINITY);
         assert!((limit(far / (far + near)) - 1.0).abs() < 1e-15);
+    }
+
+    /// A formula of two numbers.
+    type Formula = fn([Ray; 2]) -> Ray;
+
+    /// Rows of coefficients tell the limits that single series tell.
+    #[test]
+    fn bundles_agree_with_series() {
+        let formulas: [Formula; 14] = [
+            |[x, y]| (x * x + y * y).sqrt() / (x - y),
+            |[x, y]| (x * y).abs().powf::<B>(number(0.4)) / (x.abs() + y * y).powf::<B>(number(0.8)),
+            |[x, y]| (x * x).ln::<B>() / (y * y * x.abs()).ln::<B>(),
+            |[x, y]| (x.abs().ln::<B>() + y).exp::<B>() / y,
+            |[x, y]| y.atan2::<B>(x) - x.atan2::<B>(y),
+            |[x, y]| (x * x * y).atan2::<B>(number(-1.0)) + (x / y).exp::<B>(),
+            |[x, y]| (number(1.0) + x - (x + y).exp::<B>()) / x,
+            |[x, y]| (x / y).sin::<B>() + (number(2.0) + y).cos::<B>(),
+            |[x, y]| x.max(y) / x.min(y),
+            |[x, y]| (number(1.0) / x - number(1.0) / y) * x * y / (x + y),
+            |[x, y]| Ray::select(x.less(y), x * x, y.abs().sqrt()) / (x * y).abs().sqrt(),
+            |[x, y]| (x + y).sqrt() * (number(3.0) + x).ln::<B>(),
+            |[x, y]| ((number(1.0) + x).sqrt() - number(1.0) - number(0.5) * x) / (x * y),
+            |[x, y]| ((number(1.0) + x).ln::<B>() - x) / (x * y) + (x.atan2::<B>(number(1.0) + y) - x) / (x * y),
+        ];
+        let slopes: Vec<Vec<f64>> = (0..LANES).map(|ray| vec![slope(ray, 0), slope(ray, 1)]).collect();
+        let zeros = [Unbounded::of(0.0); 2];
+        for (number, formula) in formulas.into_iter().enumerate() {
+            let along = |rays: &[Ray]| (vec![formula([rays[0], rays[1]])], Outcomes::none());
+            let [rows, series] =
+                LENGTHS.map(|length| Ray::evaluate_to(length, &zeros, &slopes.iter().collect::<Vec<_>>(), &along).0);
+            for (ray, (rows, series)) in rows.into_iter().zip(series).enumerate() {
+                match [rows, series].map(|found| found.limits.expect("no flag")[0]) {
+                    [Limit::Finite(a), Limit::Finite(b)] => {
+                        let [a, b] = [a, b].map(Unbounded::to_scalar);
+                        assert!((a - b).abs() <= 1e-14 * b.abs().max(1.0), "{number} along {ray}: {a}, not {b}");
+                    }
+                    [Limit::Infinite(a), Limit::Infinite(b)] => assert_eq!(a, b, "{number} along {ray}"),
+                    [Limit::Unknown, Limit::Unknown] => {}
+                    other => panic!("{number} along {ray}: {other:?}"),
+                }
+            }
+        }
     }
 
     #[test]
