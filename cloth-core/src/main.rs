@@ -58,8 +58,8 @@ enum Command {
 fn main() -> ExitCode {
     // Exit quietly if the reader closes the pipe (`| head`).
     sigpipe::reset();
-    run(Arguments::parse().command).unwrap_or_else(|error| {
-        eprintln!("error: {}", energy_cli::message(&error));
+    energy_cli::report_file_limits().and_then(|()| run(Arguments::parse().command)).unwrap_or_else(|error| {
+        energy_cli::tell(&format!("error: {}", energy_cli::message(&error)));
         ExitCode::FAILURE
     })
 }

@@ -10,6 +10,7 @@ mod exported_garment;
 mod folders;
 mod frame_rates;
 mod fuzz;
+mod hostile_folders;
 mod known_answers;
 mod limits;
 mod linear_solvers;

@@ -26,14 +26,18 @@ pub enum JsonFileError {
     },
 }
 
-/// Reads a file.
+/// The largest file of a body, a skeleton or joints, in bytes.
+const LARGEST_FILE: u64 = 256 << 20;
+
+/// Reads a regular file.
 pub(crate) fn read_json<T: DeserializeOwned>(path: &Path) -> Result<T, JsonFileError> {
-    let text = std::fs::read_to_string(path).map_err(|source| JsonFileError::File { path: path.into(), source })?;
+    let text = energy_files::read_text(path, LARGEST_FILE)
+        .map_err(|source| JsonFileError::File { path: path.into(), source })?;
     serde_json::from_str(&text).map_err(|source| JsonFileError::Json { path: path.into(), source })
 }
 
 /// Writes a file completely or not at all.
 pub(crate) fn write_json(path: &Path, value: &impl Serialize) -> Result<(), JsonFileError> {
     let text = serde_json::to_vec(value).map_err(|source| JsonFileError::Json { path: path.into(), source })?;
-    energy_cli::write_whole(path, &text).map_err(|source| JsonFileError::File { path: path.into(), source })
+    energy_files::write_whole(path, &text).map_err(|source| JsonFileError::File { path: path.into(), source })
 }

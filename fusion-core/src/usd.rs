@@ -1,17 +1,15 @@
 //! A track as Universal Scene Description, in its text format (`.usda`).
 
-use std::fs::File;
 use std::io::{BufWriter, Result, Write};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
+use energy_files::PartFile;
 use nalgebra::Vector3;
 
 /// Writes a mesh whose points move, frame by frame. The file appears when it is complete.
 #[derive(Debug)]
 pub struct UsdWriter {
-    path: PathBuf,
-    part: PathBuf,
-    file: BufWriter<File>,
+    file: BufWriter<PartFile>,
 }
 
 impl UsdWriter {
@@ -22,10 +20,7 @@ impl UsdWriter {
     /// # Errors
     /// If the file cannot be written.
     pub fn create(path: &Path, triangles: &[[u32; 3]], frames_per_second: f64, last: f64) -> Result<Self> {
-        let mut part = path.as_os_str().to_owned();
-        part.push(".part");
-        let part = PathBuf::from(part);
-        let mut file = BufWriter::new(File::create(&part)?);
+        let mut file = BufWriter::new(PartFile::create(path)?);
         write!(
             file,
             "#usda 1.0\n(\n    defaultPrim = \"Track\"\n    \
@@ -41,7 +36,7 @@ impl UsdWriter {
         write!(file, "]\n        int[] faceVertexIndices = [")?;
         list(&mut file, triangles, |file, [a, b, c]| write!(file, "{a}, {b}, {c}"))?;
         write!(file, "]\n        point3f[] points.timeSamples = {{\n")?;
-        Ok(Self { path: path.into(), part, file })
+        Ok(Self { file })
     }
 
     /// Adds the points of a frame at a time code, with micrometre precision.
@@ -60,16 +55,15 @@ impl UsdWriter {
     /// If the file cannot be written.
     pub fn finish(mut self) -> Result<()> {
         write!(self.file, "        }}\n    }}\n}}\n")?;
-        self.file.flush()?;
-        std::fs::rename(&self.part, &self.path)
+        self.file.into_inner()?.finish()
     }
 }
 
 /// Writes the entries of a list, separated by commas.
 fn list<T>(
-    file: &mut BufWriter<File>,
+    file: &mut BufWriter<PartFile>,
     entries: &[T],
-    mut write: impl FnMut(&mut BufWriter<File>, &T) -> Result<()>,
+    mut write: impl FnMut(&mut BufWriter<PartFile>, &T) -> Result<()>,
 ) -> Result<()> {
     for (at, entry) in entries.iter().enumerate() {
         if at > 0 {

@@ -19,14 +19,15 @@ fn recording() -> (TempDir, PathBuf) {
     (folder, recording)
 }
 
-/// Tracks a recording and asserts that it fails, with messages that contain all `parts`.
-fn refused(recording: &Path, more: &[&str], parts: &[&str]) {
+/// Tracks a recording and asserts that it fails, with messages that contain all `parts`. Returns the messages.
+fn refused(recording: &Path, more: &[&str], parts: &[&str]) -> String {
     let track = recording.with_file_name("track");
     let arguments = [&["track", recording.to_str().unwrap(), "-o", track.to_str().unwrap()], more].concat();
     let (code, error) = fusion(&arguments);
     assert_eq!(code, Some(1), "{error}");
     assert!(parts.iter().all(|part| error.contains(part)), "{parts:?} not in: {error}");
     assert!(!track.exists(), "refused before anything is written");
+    error
 }
 
 /// Tracks with options as JSON and asserts that they are refused.
@@ -34,7 +35,10 @@ fn option_refused(options: &str, parts: &[&str]) {
     let (_folder, recording) = recording();
     let file = recording.join("options.json");
     std::fs::write(&file, options).unwrap();
-    refused(&recording, &["--options", file.to_str().unwrap()], parts);
+    // Messages name the file that is at fault, and no other.
+    let parts = [parts, &["options.json"]].concat();
+    let error = refused(&recording, &["--options", file.to_str().unwrap()], &parts);
+    assert!(!error.contains("intrinsics.json"), "{error}");
 }
 
 #[test]

@@ -77,7 +77,7 @@ fn a_sequence_of_the_tum_needs_a_camera_only() {
     for frame in 0..3 {
         let time = format!("{:.6}", 1_305_031_102.160_407 + f64::from(frame) / 30.0);
         let old = folder.join(format!("depth/{frame:06}.png"));
-        let image = read_depth(&old, 1000.0).unwrap();
+        let image = read_depth(&old, 1000.0, None).unwrap();
         write_depth(&folder.join(format!("depth/{time}.png")), &image, GivenCamera::TUM_SCALE).unwrap();
         std::fs::remove_file(old).unwrap();
         writeln!(list, "{time} depth/{time}.png").unwrap();

@@ -4,7 +4,7 @@
 //! Modules, from the bottom up; each uses only those above it:
 //!
 //! - [`geometry`]: vectors, rigid motions, boxes and hierarchies of boxes
-//! - [`bounded`], [`input_text`]: values with ranges, and files of limited size
+//! - [`bounded`]: values with ranges
 //! - [`motion`], [`mesh`]: keyframes, triangle meshes
 //! - [`collision`]: pairs of features, certificates of moves, the exact test for crossings
 //! - [`barrier`]: contact of cloth with itself and with obstacles, by potentials that keep gaps open
@@ -30,7 +30,6 @@ pub mod collision;
 pub mod contact;
 pub mod fabric;
 pub mod geometry;
-pub mod input_text;
 pub mod integrator;
 pub mod mesh;
 pub mod motion;

@@ -7,7 +7,8 @@ use energy_dsl::Vector3;
 use energy_elements::WindDrag;
 use energy_solve::{DissipationLaw, DissipationTerm, StepStart, Term};
 use schemars::JsonSchema;
-use serde::Deserialize;
+use serde::de::Error as _;
+use serde::{Deserialize, Deserializer};
 
 use crate::bounded::{NonNegative, Number, Positive, Real, Reals, Speed};
 
@@ -22,8 +23,9 @@ pub struct Wind {
     /// The velocity of the air, in m/s.
     #[serde(with = "Reals::<Speed, 3>")]
     pub velocity: [f64; 3],
-    /// Gusts added to the velocity. Default none.
-    #[serde(default)]
+    /// Gusts added to the velocity, at most 64. Default none.
+    #[serde(default, deserialize_with = "few_gusts")]
+    #[schemars(length(max = 64))]
     pub gusts: Vec<Gust>,
     /// Density ρ of the air, in kg/m³. Default 1.2.
     #[serde(default = "air", with = "Real::<Positive>")]
@@ -82,6 +84,17 @@ pub struct Gust {
     /// Phase at time 0, as a fraction of the period. Default 0.
     #[serde(default, with = "Real::<Number>")]
     pub phase: f64,
+}
+
+/// The largest number of gusts: all are summed in every step.
+const MOST_GUSTS: usize = 64;
+
+fn few_gusts<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<Gust>, D::Error> {
+    let gusts = Vec::deserialize(deserializer)?;
+    match gusts.len() <= MOST_GUSTS {
+        true => Ok(gusts),
+        false => Err(D::Error::custom(format!("expected at most {MOST_GUSTS} gusts, got {}", gusts.len()))),
+    }
 }
 
 fn air() -> f64 {

@@ -18,6 +18,15 @@ pub enum SceneError {
         /// The problem, with a remedy if one is known.
         message: String,
     },
+    /// The scene names a file outside the folders that it may read.
+    #[error(
+        "{} is outside the scene's folder; move it there, or allow its folder by --allow-path {}",
+        .file.display(), .file.parent().unwrap_or(.file).display()
+    )]
+    Outside {
+        /// The path as the scene names it, within its folder.
+        file: PathBuf,
+    },
 }
 
 impl SceneError {

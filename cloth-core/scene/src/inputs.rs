@@ -1,8 +1,8 @@
 //! The files that a scene reads.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-use super::{Mesh, RestShape, Scene};
+use super::{Mesh, RestShape, Scene, SceneError};
 use cloth_physics::fabric::Material;
 
 impl Scene {
@@ -26,5 +26,35 @@ impl Scene {
         paths.sort();
         paths.dedup();
         paths
+    }
+
+    /// Checks that the scene reads files of its own folder and of `allowed` ones only, also through `..` and symbolic
+    /// links. The scene of a stranger should pass it before the files are read: messages quote lines of malformed ones.
+    ///
+    /// # Errors
+    /// Returns an error for the first file that is elsewhere.
+    ///
+    /// ```
+    /// # let folder = tempfile::tempdir()?;
+    /// let text = "dt = 0.01\nduration = 1.0\nmesh.obj.path = \"/etc/hosts\"\n[fabric]\ndensity = 0.2\n\
+    ///             material.stvk = { stretch_stiffness = 40.0, poisson_ratio = 0.3 }";
+    /// let scene = cloth_scene::Scene::parse(text, &folder.path().join("scene.toml"))?;
+    /// assert!(scene.check_paths(&["/etc".into()]).is_ok());
+    /// let error = scene.check_paths(&[]).unwrap_err().to_string();
+    /// assert!(error.ends_with("is outside the scene's folder; move it there, or allow its folder by --allow-path /etc"));
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn check_paths(&self, allowed: &[PathBuf]) -> Result<(), SceneError> {
+        let own = if self.folder.as_os_str().is_empty() { Path::new(".") } else { &self.folder };
+        let folders = std::iter::once(own).chain(allowed.iter().map(PathBuf::as_path));
+        let folders: Vec<PathBuf> = folders.filter_map(|folder| folder.canonicalize().ok()).collect();
+        let is_outside = |file: &PathBuf| {
+            // A file that does not exist cannot be read, either.
+            file.canonicalize().is_ok_and(|file| !folders.iter().any(|folder| file.starts_with(folder)))
+        };
+        match self.input_files().into_iter().find(is_outside) {
+            Some(file) => Err(SceneError::Outside { file }),
+            None => Ok(()),
+        }
     }
 }

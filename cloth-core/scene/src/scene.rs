@@ -2,7 +2,6 @@ use std::path::{Path, PathBuf};
 
 use cloth_physics::bounded::Strict;
 use cloth_physics::fabric::Material;
-use cloth_physics::input_text;
 use cloth_physics::integrator::{Adaptive, Integrator, LinearSolverChoice, Scheme, Tolerances};
 use cloth_physics::wind::Wind;
 use serde::Deserialize;
@@ -76,7 +75,7 @@ impl Scene {
     /// # Errors
     /// Returns an error if the file cannot be read.
     pub fn text(path: &Path) -> Result<String, SceneError> {
-        let text = input_text::read(path, LARGEST_FILE).and_then(input_text::utf8);
+        let text = energy_files::read_text(path, LARGEST_FILE);
         text.map_err(|source| SceneError::Unreadable { path: path.to_owned(), source })
     }
 

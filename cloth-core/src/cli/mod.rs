@@ -1,10 +1,10 @@
 //! The subcommands of `cloth`, one per file.
 
+pub mod allowed_folders;
 pub mod bench;
 pub mod completions;
 pub mod demo;
 pub mod fabrics;
-pub mod interrupts;
 pub mod manual;
 pub mod materials;
 pub mod report;
@@ -15,18 +15,8 @@ pub mod sweep;
 pub mod validate;
 pub mod view;
 
-use std::io::{ErrorKind, Write};
-
-use anyhow::{Context, Result};
+use energy_cli::print;
 use indicatif::{ProgressBar, ProgressStyle};
-
-/// Prints to standard output. A closed pipe (`| head`) is not an error.
-fn print(text: &str) -> Result<()> {
-    match std::io::stdout().lock().write_all(text.as_bytes()) {
-        Err(error) if error.kind() != ErrorKind::BrokenPipe => Err(error).context("cannot print"),
-        _ => Ok(()),
-    }
-}
 
 /// Creates a progress bar on standard error, hidden unless that is a terminal.
 fn progress_bar(steps: u64) -> ProgressBar {

@@ -5,6 +5,7 @@ use anyhow::Result;
 use clap::Args;
 use cloth_core::run::Run;
 
+use super::allowed_folders::AllowedFolders;
 use super::run::{LogChoice, limit_threads, simulate};
 
 #[derive(Debug, Args)]
@@ -14,6 +15,8 @@ pub struct Resume {
     /// Continue although meshes or materials were edited since the run began.
     #[arg(long)]
     accept_edited: bool,
+    #[command(flatten)]
+    allowed: AllowedFolders,
     /// Print the tables of `cloth run --stats`.
     #[arg(long)]
     stats: bool,
@@ -27,7 +30,8 @@ pub struct Resume {
 
 impl Resume {
     pub fn run(self) -> Result<ExitCode> {
-        let run = Run::resume(&self.folder, self.accept_edited)?;
+        let run =
+            Run::resume_checked(&self.folder, self.accept_edited, |scene| scene.check_paths(self.allowed.folders()))?;
         simulate(limit_threads(run, self.threads), self.stats, self.log)
     }
 }

@@ -6,9 +6,10 @@ use clap::{Args, ValueEnum};
 use cloth_core::output::OutputFolder;
 use cloth_core::run::{Ending, Event, Forecast, Log, Progress, Run, RunError, RunOptions, stats};
 use cloth_core::scene::{self, Scene};
+use energy_cli::{Interrupts, tell};
 use serde_json::{Value, json};
 
-use super::interrupts::Interrupts;
+use super::allowed_folders::AllowedFolders;
 use super::print;
 
 #[derive(Debug, Args)]
@@ -40,6 +41,8 @@ pub struct RunScene {
     /// Parameters of these elements, such as `k=20,nu=0.3`, in the units of the declaration.
     #[arg(long, requires = "material", value_delimiter = ',', value_parser = parameter)]
     parameters: Vec<(String, f64)>,
+    #[command(flatten)]
+    allowed: AllowedFolders,
     /// Repair shallow crossings at the start, as `untangle = true` does in the scene.
     #[arg(long)]
     untangle: bool,
@@ -53,14 +56,16 @@ pub struct RunScene {
 
 impl RunScene {
     pub fn run(self) -> Result<ExitCode> {
-        let Self { scene, output, overwrite, checkpoint, ignore_memory, stats, threads, log, .. } = self;
+        let Self { scene, output, overwrite, checkpoint, ignore_memory, stats, threads, log, mut allowed, .. } = self;
         let mut text = Scene::text(&scene)?;
         if let Some(file) = self.material {
             text = scene::with_material(&text, &file, &self.parameters);
+            allowed.allow(file);
         }
         if self.untangle {
             text = scene::with_untangling(&text);
         }
+        allowed.check(&text, &scene)?;
         let Some(output) = output.filter(|_| !self.dry_run) else {
             return dry_run(&text, &scene, threads, log);
         };
@@ -111,7 +116,7 @@ fn dry_run(text: &str, path: &Path, threads: Option<u16>, log: LogChoice) -> Res
             "failure": forecast.failure.as_ref().map(ToString::to_string),
         }))?;
     } else {
-        forecast.warnings.iter().for_each(|warning| eprintln!("warning: {warning}"));
+        forecast.warnings.iter().for_each(|warning| tell(&format!("warning: {warning}")));
         print(&format!("{forecast}\n"))?;
     }
     Ok(if forecast.failure.is_some() { ExitCode::FAILURE } else { ExitCode::SUCCESS })
@@ -139,8 +144,8 @@ pub fn limit_threads(run: Run, threads: Option<u16>) -> Run {
 /// Simulates until the end or a signal, and prints the summary and the files written. The exit code is 128 and the
 /// number of the signal if the run was interrupted.
 pub fn simulate(mut run: Run, with_stats: bool, log: LogChoice) -> Result<ExitCode> {
-    run.notes().iter().for_each(|note| eprintln!("note: {note}"));
-    run.simulation().warnings().iter().for_each(|warning| eprintln!("warning: {warning}"));
+    run.notes().iter().for_each(|note| tell(&format!("note: {note}")));
+    run.simulation().warnings().iter().for_each(|warning| tell(&format!("warning: {warning}")));
     let interrupts = Interrupts::listen()?;
     let mut progress = Progress::new(run.simulation().steps(), run.simulation().steps_done(), log.into());
     let ended = run.go(interrupts.flag(), |event| match event {
@@ -180,6 +185,6 @@ pub fn simulate(mut run: Run, with_stats: bool, log: LogChoice) -> Result<ExitCo
     };
     let missing = if abandoned { ", before all files were written" } else { "" };
     let (done, all) = (run.simulation().steps_done(), run.simulation().steps());
-    eprintln!("stopped after step {done} of {all}{missing}; {resume}");
+    tell(&format!("stopped after step {done} of {all}{missing}; {resume}"));
     Ok(interrupts.exit_code())
 }

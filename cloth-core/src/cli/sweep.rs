@@ -11,9 +11,11 @@ use clap::Args;
 use cloth_core::output::OutputFolder;
 use cloth_core::run::{Checkpoint, Ending, Record, Run, RunOptions};
 use cloth_core::scene::Scene;
+use energy_cli::{Interrupts, tell};
+use energy_files::excerpt;
 use toml::{Table, Value};
 
-use super::interrupts::Interrupts;
+use super::allowed_folders::AllowedFolders;
 use super::print;
 
 #[derive(Debug, Args)]
@@ -28,6 +30,8 @@ pub struct Sweep {
     /// Runs at a time, each on one thread; default: one per core.
     #[arg(long, value_parser = clap::value_parser!(u16).range(1..))]
     jobs: Option<u16>,
+    #[command(flatten)]
+    allowed: AllowedFolders,
     /// Steps between checkpoints.
     #[arg(long, value_name = "STEPS", default_value = "50", value_parser = clap::value_parser!(u64).range(1..))]
     checkpoint: u64,
@@ -49,7 +53,8 @@ impl Sweep {
     pub fn run(self) -> Result<ExitCode> {
         let base: Table = Scene::text(&self.scene)?.parse().with_context(|| self.scene.display().to_string())?;
         let file = self.parameters.display().to_string();
-        let text = std::fs::read_to_string(&self.parameters).with_context(|| format!("cannot read {file}"))?;
+        let text =
+            energy_files::read_text(&self.parameters, LARGEST_TABLE).with_context(|| format!("cannot read {file}"))?;
         let mut grid = Vec::new();
         flatten("", &text.parse().with_context(|| file.clone())?, &mut grid).with_context(|| file.clone())?;
         let choices = choices(&base, &grid, &self.scene).context(file)?;
@@ -57,7 +62,7 @@ impl Sweep {
         let interrupts = Interrupts::listen()?;
         let failures = self.simulate(&choices, &interrupts)?;
         if interrupts.flag().load(Ordering::Relaxed) {
-            eprintln!("stopped; the same command continues the sweep");
+            tell("stopped; the same command continues the sweep");
             return Ok(interrupts.exit_code());
         }
         let keys: Vec<&str> = grid.iter().map(|(key, _)| key.as_str()).collect();
@@ -79,7 +84,7 @@ impl Sweep {
                     let failure = self.run_one(choice, interrupts).err().map(|error| energy_cli::message(&error));
                     if !interrupts.flag().load(Ordering::Relaxed) {
                         let state = failure.as_deref().unwrap_or("done");
-                        eprintln!("{} of {}: {} {state}", index + 1, choices.len(), choice.name);
+                        tell(&format!("{} of {}: {} {state}", index + 1, choices.len(), choice.name));
                     }
                     failures.lock().expect("no thread panics")[index] = failure;
                 }
@@ -92,9 +97,13 @@ impl Sweep {
     }
 
     fn run_one(&self, choice: &Choice, interrupts: &Interrupts) -> Result<()> {
-        let folder = self.output.join(&choice.name);
+        self.allowed
+            .check(&choice.text, &self.scene)
+            .map_err(|error| anyhow!(with_line(&choice.text, &error.to_string())))?;
+        // A symbolic link in its place would lead elsewhere.
+        let folder = energy_files::subfolder(&self.output, &choice.name)?;
         let done = folder.join(DONE);
-        if done.exists() {
+        if done.symlink_metadata().is_ok_and(|done| done.is_file()) {
             return Ok(());
         }
         let options = RunOptions { overwrite: true, checkpoint_interval: Some(self.checkpoint), ignore_memory: false };
@@ -107,7 +116,7 @@ impl Sweep {
         let ending = run.with_threads(1).go(interrupts.flag(), |_| ())?;
         match ending {
             Ending { failure: Some(failure), .. } => Err(failure.into()),
-            Ending { finished: true, abandoned: false, .. } => Ok(std::fs::write(done, "")?),
+            Ending { finished: true, abandoned: false, .. } => Ok(energy_files::write_whole(&done, b"")?),
             _ => Ok(()),
         }
     }
@@ -140,6 +149,11 @@ impl Sweep {
         Ok(())
     }
 }
+
+/// The largest table of values, in bytes.
+const LARGEST_TABLE: u64 = 1 << 20;
+/// The largest number of runs. All their scenes are in memory.
+const MOST_RUNS: usize = 10_000;
 
 const INDEX: &str = "index.csv";
 /// A file in the folder of a run that was completed.
@@ -205,6 +219,11 @@ fn flatten(prefix: &str, table: &Table, grid: &mut Vec<(String, Vec<Value>)>) ->
 
 /// Returns all combinations of values; the last key varies fastest. `path` is that of the scene.
 fn choices(base: &Table, grid: &[(String, Vec<Value>)], path: &Path) -> Result<Vec<Choice>> {
+    let count = grid.iter().try_fold(1_usize, |count, (_, values)| count.checked_mul(values.len()));
+    if count.is_none_or(|count| count > MOST_RUNS) {
+        let lists = grid.iter().map(|(key, values)| format!("{} of {key}", values.len())).collect::<Vec<_>>();
+        bail!("expected at most {MOST_RUNS} runs, got all combinations of {}", excerpt(&lists.join(", ")));
+    }
     let mut combinations: Vec<Vec<Value>> = vec![Vec::new()];
     for (_, values) in grid {
         let extend = |head: Vec<Value>| values.iter().map(move |value| [&head[..], slice::from_ref(value)].concat());

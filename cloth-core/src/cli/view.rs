@@ -2,9 +2,12 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
 use clap::Args;
+use cloth_core::run::Record;
+use cloth_core::scene::Scene;
 use cloth_core::view::{self, Colouring, Moment, Screenshot};
 use indicatif::ProgressBar;
 
+use super::allowed_folders::AllowedFolders;
 use super::print;
 
 #[derive(Debug, Args)]
@@ -17,6 +20,8 @@ pub struct View {
     /// Draw the edges of triangles; the key w changes it.
     #[arg(long)]
     wireframe: bool,
+    #[command(flatten)]
+    allowed: AllowedFolders,
     /// Write a picture to this PNG file instead of opening a window.
     #[arg(long, value_name = "FILE.png", value_parser = png_file)]
     screenshot: Option<PathBuf>,
@@ -32,11 +37,35 @@ impl View {
     pub fn run(&self) -> Result<()> {
         match &self.screenshot {
             Some(file) => self.write_screenshot(file),
-            None => open_window(&self.shown, self.colours, self.wireframe),
+            None => self.open_window(),
         }
     }
 
+    /// Checks the paths of the scene before its files are read.
+    fn check_paths(&self) -> Result<()> {
+        if !self.shown.is_dir() {
+            return self.allowed.check(&Scene::text(&self.shown)?, &self.shown);
+        }
+        let record = Record::read(&self.shown)?;
+        self.allowed.check(&record.scene, &record.path)
+    }
+
+    #[cfg(feature = "view")]
+    fn open_window(&self) -> Result<()> {
+        self.check_paths()?;
+        Ok(view::open_window(&self.shown, self.colours, self.wireframe)?)
+    }
+
+    #[cfg(not(feature = "view"))]
+    fn open_window(&self) -> Result<()> {
+        anyhow::bail!(
+            "this build has no window; build one with `cargo build --release -p cloth-core --features view`, or write \
+             a picture with --screenshot FILE.png"
+        )
+    }
+
     fn write_screenshot(&self, file: &Path) -> Result<()> {
+        self.check_paths()?;
         let moment = match (self.frame, self.time) {
             (Some(frame), _) => Moment::Frame(frame),
             (None, Some(time)) => Moment::Time(time),
@@ -49,19 +78,6 @@ impl View {
         energy_cli::write_whole(file, &png).with_context(|| format!("cannot write {}", file.display()))?;
         print(&format!("wrote {}: t = {time:.4} s, {legend}\n", file.display()))
     }
-}
-
-#[cfg(feature = "view")]
-fn open_window(shown: &Path, colours: Colouring, wireframe: bool) -> Result<()> {
-    Ok(view::open_window(shown, colours, wireframe)?)
-}
-
-#[cfg(not(feature = "view"))]
-fn open_window(_: &Path, _: Colouring, _: bool) -> Result<()> {
-    anyhow::bail!(
-        "this build has no window; build one with `cargo build --release -p cloth-core --features view`, or write a \
-         picture with --screenshot FILE.png"
-    )
 }
 
 fn png_file(text: &str) -> Result<PathBuf, String> {

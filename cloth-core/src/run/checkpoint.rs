@@ -1,12 +1,14 @@
 use std::path::{Path, PathBuf};
 
+use energy_files::InputFile;
+use energy_files::sealed::{Seal, SealError};
 use serde::{Deserialize, Serialize};
 
-use super::input_files::InputFile;
 use crate::simulation::{RestoreError, SavedState};
 
-/// The first word of a checkpoint; version, length and CRC-32 of the rest follow.
-const KEYWORD: &str = "cloth-checkpoint";
+const SEAL: Seal = Seal { keyword: "cloth-checkpoint", version: Checkpoint::VERSION };
+/// The largest file, in bytes: the state of some ten million vertices.
+const LARGEST_FILE: u64 = 4 << 30;
 
 /// A checkpoint of a run: the scene, the state, and the progress of the output.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -65,6 +67,13 @@ pub enum CheckpointError {
     State(#[from] RestoreError),
 }
 
+impl CheckpointError {
+    /// Whether the checkpoint before this one may be usable.
+    pub(super) fn is_of_the_file(&self) -> bool {
+        matches!(self, Self::Unreadable { .. } | Self::Foreign { .. } | Self::Damaged { .. })
+    }
+}
+
 impl Checkpoint {
     /// The version that this program reads and writes.
     pub const VERSION: u32 = 4;
@@ -75,11 +84,7 @@ impl Checkpoint {
     /// # Errors
     /// Returns an error if a number is not finite.
     pub fn to_bytes(&self) -> Result<Vec<u8>, serde_json::Error> {
-        let body = serde_json::to_vec(self)?;
-        let mut file =
-            format!("{KEYWORD} {} {} {:08x}\n", Self::VERSION, body.len(), crc32fast::hash(&body)).into_bytes();
-        file.extend(body);
-        Ok(file)
+        Ok(SEAL.close(&serde_json::to_vec(self)?))
     }
 
     /// Reads a checkpoint.
@@ -87,8 +92,8 @@ impl Checkpoint {
     /// # Errors
     /// Returns an error if the file cannot be read, is damaged, or has another version.
     pub fn read(path: &Path) -> Result<Self, CheckpointError> {
-        let file =
-            std::fs::read(path).map_err(|source| CheckpointError::Unreadable { path: path.to_owned(), source })?;
+        let file = energy_files::read_state(path, LARGEST_FILE);
+        let file = file.map_err(|source| CheckpointError::Unreadable { path: path.to_owned(), source })?;
         Self::from_bytes(&file, path)
     }
 
@@ -98,29 +103,15 @@ impl Checkpoint {
     /// Returns an error if the contents are damaged or have another version.
     pub fn from_bytes(file: &[u8], path: &Path) -> Result<Self, CheckpointError> {
         let path = path.to_owned();
-        let end = file.iter().position(|&byte| byte == b'\n').unwrap_or(file.len());
-        let head = String::from_utf8_lossy(&file[..end]);
-        let mut words = head.split(' ');
-        if words.next() != Some(KEYWORD) {
-            return Err(CheckpointError::Foreign { path });
-        }
         let damaged = |reason: &str| CheckpointError::Damaged { path: path.clone(), reason: reason.to_owned() };
-        let version: u32 =
-            words.next().and_then(|word| word.parse().ok()).ok_or_else(|| damaged("its first line is broken"))?;
-        if version > Self::VERSION {
-            return Err(CheckpointError::Newer { path, version });
-        }
-        if version < Self::VERSION {
-            return Err(CheckpointError::Older { path, version });
-        }
-        let (length, checksum) = (words.next(), words.next());
-        let body = file.get(end + 1..).unwrap_or_default();
-        if length.and_then(|word| word.parse().ok()) != Some(body.len()) {
-            return Err(damaged("it is cut short"));
-        }
-        if checksum.and_then(|word| u32::from_str_radix(word, 16).ok()) != Some(crc32fast::hash(body)) {
-            return Err(damaged("its checksum does not match"));
-        }
+        let body = SEAL.open(file).map_err(|error| match error {
+            SealError::Foreign => CheckpointError::Foreign { path: path.clone() },
+            SealError::OtherVersion(version) if version > Self::VERSION => {
+                CheckpointError::Newer { path: path.clone(), version }
+            }
+            SealError::OtherVersion(version) => CheckpointError::Older { path: path.clone(), version },
+            SealError::Damaged(reason) => damaged(reason),
+        })?;
         serde_json::from_slice(body).map_err(|error| damaged(&error.to_string()))
     }
 }

@@ -1,9 +1,11 @@
 //! Films of the pictures of frames: animated PNG, and MP4 by the program ffmpeg.
 
-use std::fs::File;
+use std::fs::OpenOptions;
 use std::io::{BufReader, ErrorKind};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
+
+use energy_files::PartFile;
 
 use super::{Run, RunError};
 use crate::output::OutputFolder;
@@ -45,24 +47,27 @@ impl Run {
     /// Lets ffmpeg write a film of the pictures of all frames.
     pub(super) fn write_film(&self, rate: f64) -> Result<PathBuf, RunError> {
         let path = self.folder.path().join(OutputFolder::FILM);
-        let unfinished = self.folder.path().join(".cloth.mp4.unfinished");
         let pictures = self.folder.path().join(OutputFolder::FRAMES).join("cloth_%04d.png");
+        let failed = |reason: String| RunError::from(FilmError::Ffmpeg(reason));
+        // Created here, so that ffmpeg follows no link.
+        let unfinished = PartFile::create(&path).map_err(|error| failed(error.to_string()))?;
         let mut command = Command::new("ffmpeg");
         command.args(["-y", "-loglevel", "error", "-framerate", &rate.to_string(), "-i"]).arg(pictures);
         // Films need even sizes.
-        command.args(["-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", "-pix_fmt", "yuv420p", "-f", "mp4"]).arg(&unfinished);
-        let failed = |reason: String| {
-            let _ = std::fs::remove_file(&unfinished);
-            RunError::from(FilmError::Ffmpeg(reason))
-        };
+        command
+            .args(["-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", "-pix_fmt", "yuv420p", "-f", "mp4"])
+            .arg(unfinished.path());
         let output = command.stdin(Stdio::null()).output().map_err(|error| failed(error.to_string()))?;
         if !output.status.success() {
             return Err(failed(String::from_utf8_lossy(&output.stderr).trim().to_owned()));
         }
-        std::fs::rename(&unfinished, &path).map_err(|error| failed(error.to_string()))?;
+        unfinished.finish().map_err(|error| failed(error.to_string()))?;
         Ok(path)
     }
 }
+
+/// The largest picture, in bytes.
+const LARGEST_PICTURE: u64 = 256 << 20;
 
 /// A picture: width, height and RGBA bytes.
 struct Picture {
@@ -72,10 +77,13 @@ struct Picture {
 
 fn decoded(path: &Path) -> Result<Picture, FilmError> {
     let unreadable = |reason: String| FilmError::Picture { path: path.to_owned(), reason };
-    let file = File::open(path).map_err(|error| unreadable(error.to_string()))?;
+    let file = energy_files::open_state(path, LARGEST_PICTURE, OpenOptions::new().read(true));
+    let file = file.map_err(|error| unreadable(error.to_string()))?;
     let mut reader =
         png::Decoder::new(BufReader::new(file)).read_info().map_err(|error| unreadable(error.to_string()))?;
-    let size = reader.output_buffer_size().ok_or_else(|| unreadable("it is too large".to_owned()))?;
+    // Pictures are drawn by this program, at most this large.
+    let size = reader.output_buffer_size().filter(|&size| size <= LARGEST_PICTURE as usize);
+    let size = size.ok_or_else(|| unreadable("it is too large".to_owned()))?;
     let mut pixels = vec![0; size];
     let info = reader.next_frame(&mut pixels).map_err(|error| unreadable(error.to_string()))?;
     if (info.color_type, info.bit_depth) != (png::ColorType::Rgba, png::BitDepth::Eight) {

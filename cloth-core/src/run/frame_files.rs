@@ -1,6 +1,6 @@
 //! The files of single frames, OBJ and PLY.
 
-use std::fs::File;
+use std::fs::OpenOptions;
 use std::io::{Read, Seek, SeekFrom};
 use std::path::Path;
 
@@ -42,11 +42,11 @@ impl Run {
 }
 
 fn has_contents(path: &Path, contents: &[u8]) -> bool {
-    std::fs::read(path).is_ok_and(|found| found == contents)
+    energy_files::read_state(path, contents.len() as u64).is_ok_and(|found| found == contents)
 }
 
 fn ends_with(path: &Path, end: &[u8]) -> std::io::Result<bool> {
-    let mut file = File::open(path)?;
+    let mut file = energy_files::open_state(path, u64::MAX, OpenOptions::new().read(true))?;
     if file.metadata()?.len() < end.len() as u64 {
         return Ok(false);
     }

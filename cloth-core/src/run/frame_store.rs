@@ -1,11 +1,11 @@
 //! The frames of a run, in memory and in an append-only file next to the checkpoint.
 
-use std::fs::{File, OpenOptions};
-use std::io::Write;
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use energy_dsl::Vector3;
+use energy_files::AppendFile;
 
 use super::checkpoint::CheckpointError;
 use crate::output::OutputError;
@@ -61,21 +61,16 @@ pub(crate) struct FrameStore {
     vectors: Vec<Vectors>,
     stored: Wanted,
     kept: Wanted,
-    file: Option<(PathBuf, File)>,
-    checksum: crc32fast::Hasher,
+    file: Option<AppendFile>,
 }
 
 impl FrameStore {
     /// Creates an empty store, backed by a file if a path is given.
     pub(crate) fn new(path: Option<PathBuf>, wanted: &OutputChoice) -> Result<Self, OutputError> {
-        let open = |path: PathBuf| match File::create(&path) {
-            Ok(file) => Ok((path, file)),
-            Err(source) => Err(OutputError::File { path, source }),
-        };
-        let (file, checksum) = (path.map(open).transpose()?, crc32fast::Hasher::new());
+        let open = |path: PathBuf| AppendFile::create(&path).map_err(|source| OutputError::File { path, source });
+        let (file, (stored, kept)) = (path.map(open).transpose()?, needs(wanted));
         let (frames, vectors) = (Vec::new(), Vec::new());
-        let (stored, kept) = needs(wanted);
-        Ok(Self { frames, vectors, stored, kept, file, checksum })
+        Ok(Self { frames, vectors, stored, kept, file })
     }
 
     /// Reads the first frames of a file and truncates it after them: later frames were written after the checkpoint.
@@ -87,18 +82,14 @@ impl FrameStore {
         wanted: &OutputChoice,
         checksum: u32,
     ) -> Result<(Self, Vec<Vectors>), CheckpointError> {
-        let unreadable = |source| CheckpointError::Unreadable { path: path.to_owned(), source };
-        let bytes = std::fs::read(path).map_err(unreadable)?;
         let (stored, kept) = needs(wanted);
         let of_positions = 24 * vertices;
         let size = of_positions + stored.size() * vertices;
-        let damaged = |reason: &str| CheckpointError::Damaged { path: path.to_owned(), reason: reason.to_owned() };
-        let whole = bytes.get(..count * size).ok_or_else(|| damaged("it is cut short"))?;
-        let mut hasher = crc32fast::Hasher::new();
-        hasher.update(whole);
-        if hasher.clone().finalize() != checksum {
-            return Err(damaged("its checksum does not match"));
-        }
+        let length = (count as u64).saturating_mul(size as u64);
+        let (file, whole) = AppendFile::reopen(path, length, checksum).map_err(|source| match source.kind() {
+            ErrorKind::InvalidData => CheckpointError::Damaged { path: path.to_owned(), reason: source.to_string() },
+            _ => CheckpointError::Unreadable { path: path.to_owned(), source },
+        })?;
         let mut frames: Vec<Frame> = Vec::new();
         let mut vectors = Vec::new();
         for frame in 0..count {
@@ -106,11 +97,8 @@ impl FrameStore {
             frames.push(x.chunks_exact(24).map(double_point).collect());
             vectors.push(stored.read(rest));
         }
-        let file = OpenOptions::new().append(true).open(path).map_err(unreadable)?;
-        file.set_len((count * size) as u64).map_err(unreadable)?;
-        let file = Some((path.to_owned(), file));
         let own = vectors.iter().map(|vectors| kept.of(vectors)).collect();
-        Ok((Self { frames, vectors: own, stored, kept, file, checksum: hasher }, vectors))
+        Ok((Self { frames, vectors: own, stored, kept, file: Some(file) }, vectors))
     }
 
     pub(crate) fn frames(&self) -> &[Frame] {
@@ -122,19 +110,18 @@ impl FrameStore {
         &self.vectors
     }
 
-    /// CRC-32 of all frames.
+    /// CRC-32 of all frames; 0 without a file.
     pub(crate) fn checksum(&self) -> u32 {
-        self.checksum.clone().finalize()
+        self.file.as_ref().map_or(0, AppendFile::checksum)
     }
 
     pub(super) fn add(&mut self, frame: Frame, vectors: &Vectors) -> Result<(), OutputError> {
-        if let Some((path, file)) = &mut self.file {
+        if let Some(file) = &mut self.file {
             let mut bytes: Vec<u8> = frame.as_flattened().iter().flat_map(|number| number.to_le_bytes()).collect();
             let stored = self.stored.of(vectors);
             let numbers = stored.velocities.as_flattened().iter().chain(stored.forces.as_flattened());
             bytes.extend(numbers.flat_map(|&number| (number as f32).to_le_bytes()));
-            file.write_all(&bytes).map_err(|source| OutputError::File { path: path.clone(), source })?;
-            self.checksum.update(&bytes);
+            file.append(&bytes).map_err(|source| OutputError::File { path: file.path().to_owned(), source })?;
         }
         self.frames.push(frame);
         // Rounded as in the file, so that a resumed run writes the same.
@@ -144,8 +131,8 @@ impl FrameStore {
 
     /// Flushes added frames to the disk.
     pub(crate) fn sync(&self) -> Result<(), OutputError> {
-        let Some((path, file)) = &self.file else { return Ok(()) };
-        file.sync_data().map_err(|source| OutputError::File { path: path.clone(), source })
+        let Some(file) = &self.file else { return Ok(()) };
+        file.sync().map_err(|source| OutputError::File { path: file.path().to_owned(), source })
     }
 }
 

@@ -7,7 +7,6 @@ mod forecast;
 mod frame_files;
 mod frame_pictures;
 mod frame_store;
-mod input_files;
 mod memory_need;
 mod progress;
 mod progress_lines;
@@ -22,9 +21,9 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use energy_solve::EvaluationError;
 
 pub use checkpoint::{Checkpoint, CheckpointError};
+pub use energy_files::InputFile;
 pub use film::FilmError;
 pub use forecast::Forecast;
-pub use input_files::InputFile;
 pub use memory_need::MemoryNeed;
 pub use progress::{Log, Progress};
 pub use record::{Record, RecordError};
@@ -163,8 +162,8 @@ impl Run {
             pictures: None,
             threads: available_threads(),
             checkpoint_interval,
-            scene_file: InputFile::scene_itself(path),
-            inputs: InputFile::of_scene(&scene),
+            scene_file: InputFile::of(path),
+            inputs: inputs_of(&scene),
             notes: Vec::new(),
             scene,
         };
@@ -179,28 +178,61 @@ impl Run {
         Self { simulation: self.simulation.with_threads(threads), threads, ..self }
     }
 
-    /// Resumes from the checkpoint in a folder. Frames that are missing or truncated are written again. With
+    /// Resumes from the last checkpoint in a folder, or from the one before it if the last one is damaged. Frames that are missing or truncated are written again. With
     /// `accept_edited`, continues with meshes and materials that were edited since the run began.
     ///
     /// # Errors
     /// Returns an error if the checkpoint is missing, damaged, of another version, or does not fit the scene, or if
     /// files of the scene were edited.
     pub fn resume(output: &Path, accept_edited: bool) -> Result<Self, RunError> {
-        let file = output.join(OutputFolder::CHECKPOINT);
+        Self::resume_checked(output, accept_edited, |_| Ok(()))
+    }
+
+    /// Resumes as [`Self::resume`] does, after a check of the scene in the checkpoint. The scene of a stranger's run
+    /// should pass [`Scene::check_paths`] before its files are read.
+    ///
+    /// # Errors
+    /// As [`Self::resume`], and if the check fails.
+    pub fn resume_checked(
+        output: &Path,
+        accept_edited: bool,
+        check: impl Fn(&Scene) -> Result<(), SceneError>,
+    ) -> Result<Self, RunError> {
+        let [last, previous] =
+            [OutputFolder::CHECKPOINT, OutputFolder::PREVIOUS_CHECKPOINT].map(|name| output.join(name));
         // Without a checkpoint, no folder is created.
-        if !file.exists() {
-            Checkpoint::read(&file)?;
+        if !last.exists() && !previous.exists() {
+            Checkpoint::read(&last)?;
         }
         let folder = OutputFolder::reopen(output)?;
-        let saved = Checkpoint::read(&file)?;
+        match Self::resume_from(&last, folder.clone(), accept_edited, &check) {
+            Err(RunError::Checkpoint(error)) if error.is_of_the_file() && previous.symlink_metadata().is_ok() => {
+                let mut run = Self::resume_from(&previous, folder, accept_edited, &check)?;
+                run.folder.restore_checkpoint()?;
+                run.notes.push(format!("{error}; the run continues from the checkpoint before it"));
+                Ok(run)
+            }
+            resumed => resumed,
+        }
+    }
+
+    /// Resumes from a checkpoint in an open folder.
+    fn resume_from(
+        checkpoint: &Path,
+        folder: OutputFolder,
+        accept_edited: bool,
+        check: &impl Fn(&Scene) -> Result<(), SceneError>,
+    ) -> Result<Self, RunError> {
+        let saved = Checkpoint::read(checkpoint)?;
         let scene = Scene::parse(&saved.scene, &saved.path)?;
+        check(&scene)?;
         let edited = saved.inputs.iter().find(|input| input.is_edited()).filter(|_| !accept_edited);
         if let Some(InputFile { path, .. }) = edited {
             return Err(CheckpointError::Edited { path: path.clone() }.into());
         }
         let mut simulation = Simulation::new(&scene)?;
         simulation.restore(saved.state).map_err(CheckpointError::State)?;
-        let (path, vertices) = (output.join(OutputFolder::SAVED_FRAMES), simulation.positions().len());
+        let (path, vertices) = (folder.path().join(OutputFolder::SAVED_FRAMES), simulation.positions().len());
         let (frames, vectors) =
             FrameStore::reopen(&path, saved.frames, vertices, &scene.output, saved.frames_checksum)?;
         let mut run = Self {
@@ -213,7 +245,7 @@ impl Run {
             threads: available_threads(),
             checkpoint_interval: Some(saved.every),
             scene_file: saved.scene_file,
-            inputs: InputFile::of_scene(&scene),
+            inputs: inputs_of(&scene),
             notes: Vec::new(),
             scene,
         };
@@ -340,7 +372,7 @@ impl Run {
             frames_checksum: self.frames.checksum(),
             state: self.simulation.save(),
         };
-        self.folder.write(OutputFolder::CHECKPOINT, &checkpoint.to_bytes()?)?;
+        self.folder.write_checkpoint(&checkpoint.to_bytes()?)?;
         Ok(())
     }
 
@@ -361,6 +393,11 @@ impl Run {
     pub fn leaves_checkpoints(&self) -> bool {
         self.checkpoint_interval.is_some()
     }
+}
+
+/// The meshes and materials of a scene.
+fn inputs_of(scene: &Scene) -> Vec<InputFile> {
+    scene.input_files().iter().filter_map(|path| InputFile::of(path)).collect()
 }
 
 fn available_threads() -> usize {

@@ -61,7 +61,7 @@ impl Progress {
         let (sender, receiver) = channel::<u64>();
         let shown = bar.clone();
         let watchdog = std::thread::spawn(move || {
-            watchdog(&receiver, done, PATIENCE, |warning| shown.suspend(|| eprintln!("{warning}")));
+            watchdog(&receiver, done, PATIENCE, |warning| shown.suspend(|| energy_cli::tell(&warning)));
         });
         Self { bar, lines, log, steps: Some(sender), watchdog: Some(watchdog), recent: Recent::default() }
     }

@@ -7,6 +7,9 @@ use serde::{Deserialize, Serialize};
 use crate::output::OutputFolder;
 use crate::simulation::Summary;
 
+/// The largest file, in bytes.
+const LARGEST_FILE: u64 = 256 << 20;
+
 /// The record of a finished run, `run.json`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Record {
@@ -34,7 +37,8 @@ impl Record {
     /// Returns an error if the record is missing, damaged or newer than this program.
     pub fn read(folder: &Path) -> Result<Self, RecordError> {
         let path = folder.join(OutputFolder::RECORD);
-        let bytes = std::fs::read(&path).map_err(|source| RecordError::Unreadable { path: path.clone(), source })?;
+        let bytes = energy_files::read_state(&path, LARGEST_FILE)
+            .map_err(|source| RecordError::Unreadable { path: path.clone(), source })?;
         let damaged = |source| RecordError::Damaged { path: path.clone(), source };
         let version = serde_json::from_slice::<Version>(&bytes).map_err(damaged)?.version;
         if version > Self::VERSION {

@@ -47,13 +47,17 @@ pub fn write_report(folder: &Path) -> Result<PathBuf, ReportError> {
     Ok(OutputFolder::unlocked(folder)?.write(OutputFolder::REPORT, page.as_bytes())?)
 }
 
+/// The largest picture or plot, in bytes.
+const LARGEST_FILE: u64 = 64 << 20;
+
 fn read(path: &Path) -> Result<Vec<u8>, ReportError> {
-    std::fs::read(path).map_err(|source| ReportError::Unreadable { path: path.to_owned(), source })
+    energy_files::read_state(path, LARGEST_FILE)
+        .map_err(|source| ReportError::Unreadable { path: path.to_owned(), source })
 }
 
 /// Reads a file that the scene may have disabled; `None` if it does not exist.
 fn optional(path: &Path) -> Result<Option<Vec<u8>>, ReportError> {
-    if path.exists() { read(path).map(Some) } else { Ok(None) }
+    if path.symlink_metadata().is_ok() { read(path).map(Some) } else { Ok(None) }
 }
 
 /// The result of the audit of one element.
@@ -126,7 +130,9 @@ fn page(record: &Record, picture: Option<&[u8]>, plots: &Plots, audit: &[Verdict
         page.push('\n');
     };
     let title = escaped(&record.path.file_name().unwrap_or_default().to_string_lossy());
-    add(format_args!("<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<title>{title}</title>"));
+    add(format_args!(
+        "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n{POLICY}\n<title>{title}</title>"
+    ));
     add(format_args!("<style>{STYLE}</style>\n</head>\n<body>\n<h1>{title}</h1>"));
     let Summary { vertices, pinned, triangles, integrator, dt, .. } = &record.summary;
     let steps = record.summary.totals.steps;
@@ -147,7 +153,9 @@ fn page(record: &Record, picture: Option<&[u8]>, plots: &Plots, audit: &[Verdict
     }
     for (title, plot) in [("Energy", &plots.energy), ("Contact", &plots.contact)] {
         if let Some(plot) = plot {
-            add(format_args!("<h2>{title}</h2>\n{}", String::from_utf8_lossy(plot)));
+            // As a picture, a stranger's plot runs no script and reads no other file.
+            let data = STANDARD.encode(plot);
+            add(format_args!("<h2>{title}</h2>\n<img alt=\"{title}\" src=\"data:image/svg+xml;base64,{data}\">"));
         }
     }
     add(format_args!("<h2>Time</h2>\n{}", times(&record.summary)));
@@ -158,9 +166,13 @@ fn page(record: &Record, picture: Option<&[u8]>, plots: &Plots, audit: &[Verdict
     page
 }
 
+/// Nothing in the page is executed or loaded from elsewhere.
+const POLICY: &str = "<meta http-equiv=\"Content-Security-Policy\" \
+                      content=\"default-src 'none'; img-src data:; style-src 'unsafe-inline'\">";
+
 const STYLE: &str = "\
 body{font:15px/1.5 system-ui,sans-serif;max-width:70rem;margin:2rem auto;padding:0 1rem;color:#222}\
-img,svg{max-width:100%;height:auto}\
+img{max-width:100%;height:auto}\
 table{border-collapse:collapse;display:block;overflow-x:auto;font-size:13px;font-variant-numeric:tabular-nums}\
 td,th{padding:.2rem .6rem;border-bottom:1px solid #ddd;text-align:right}td:not(.text){white-space:nowrap}\
 td:first-child,th:first-child,td.text{text-align:left}pre{background:#f5f5f5;padding:1rem;overflow:auto;font-size:13px}\
@@ -215,5 +227,5 @@ fn verdicts(audit: &[Verdict]) -> String {
 }
 
 fn escaped(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;").replace('\'', "&#39;")
 }

@@ -146,7 +146,9 @@ impl Run {
     /// Writes a point cache of a part, named after it.
     fn write_cache(&self, part: usize, extension: &str, contents: &[u8]) -> Result<PathBuf, RunError> {
         let parts = self.simulation.parts();
-        let plain = |name: &str| name.replace(|c: char| !c.is_ascii_alphanumeric() && c != '-', "_");
+        // File systems allow names of 255 bytes.
+        let start = |name: &str| name.chars().take(100).collect::<String>();
+        let plain = |name: &str| start(name).replace(|c: char| !c.is_ascii_alphanumeric() && c != '-', "_");
         let name = plain(&parts[part].name);
         // Names that differ in other characters only get their number.
         let is_unique = parts.iter().filter(|other| plain(&other.name) == name).count() == 1;

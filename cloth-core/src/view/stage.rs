@@ -348,12 +348,17 @@ impl Stage {
     }
 }
 
+/// The largest file of a frame, in bytes.
+const LARGEST_FRAME: u64 = 1 << 30;
+
 /// Reads the vertices of a frame that `cloth run` wrote.
 fn read_frame(folder: &Path, number: usize, expected: usize) -> Result<Vec<Vector3<f64>>, ViewError> {
     let path = folder.join(OutputFolder::FRAMES).join(format!("cloth_{number:04}.obj"));
-    let text = std::fs::read_to_string(&path).map_err(|source| ViewError::Frame { path: path.clone(), source })?;
+    let text = energy_files::read_state(&path, LARGEST_FRAME).and_then(energy_files::utf8);
+    let text = text.map_err(|source| ViewError::Frame { path: path.clone(), source })?;
     let vertex = |line: &str| -> Option<Vector3<f64>> {
-        let mut numbers = line.strip_prefix("v ")?.split(' ').map_while(|word| word.parse().ok());
+        let mut numbers =
+            line.strip_prefix("v ")?.split(' ').map_while(|word| word.parse().ok().filter(|x: &f64| x.is_finite()));
         Some([numbers.next()?, numbers.next()?, numbers.next()?])
     };
     let vertices: Vec<Vector3<f64>> = text.lines().filter_map(vertex).collect();

@@ -1,28 +1,39 @@
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use nalgebra::{Matrix4, Point3, Vector3};
+use gltf::json::mesh::{Mode, Primitive, Semantic};
+use gltf::json::validation::Checked;
+use nalgebra::Vector3;
 
+use super::accessor::{Accessors, Usage};
+use super::glb::{Container, Fault};
 use super::mesh::Mesh;
-use super::skinned::{BodyError, Bone, SkinnedBody};
+use super::skin::SkinBones;
+use super::skinned::{BodyError, SkinnedBody};
+
+/// The largest file, in bytes.
+const LARGEST_FILE: u64 = 256 << 20;
 
 /// A glTF file without a usable skinned body.
 #[derive(Debug, thiserror::Error)]
 pub enum GltfError {
-    /// The file cannot be read or is malformed.
+    /// The file cannot be read.
     #[error("{}", .path.display())]
     Unreadable {
         /// Path of the file.
         path: PathBuf,
-        /// Error of the parser.
-        source: Box<gltf::Error>,
+        /// Error of the operating system.
+        source: std::io::Error,
     },
-    /// A required part is missing.
-    #[error("{}: {what}", .path.display())]
-    Missing {
+    /// A part is malformed or missing.
+    #[error("{}: {part}: {reason}", .path.display())]
+    Part {
         /// Path of the file.
         path: PathBuf,
-        /// The missing part, and a remedy.
-        what: &'static str,
+        /// The part, such as an accessor with its number.
+        part: String,
+        /// The reason, with a remedy if one is known.
+        reason: String,
     },
     /// The parts do not fit.
     #[error("{}", .path.display())]
@@ -38,91 +49,161 @@ pub enum GltfError {
 /// bind matrices give the joints' positions at rest. A bone's tail is the mean of its children's heads, or its own head
 /// without children.
 ///
+/// Everything that the file says about its data is checked before it is used. Memory is at most 20 times the file, and
+/// 300 MB.
+///
 /// # Errors
 /// If the file is malformed or has no skinned mesh with embedded data.
 pub fn read_gltf(path: &Path) -> Result<SkinnedBody, GltfError> {
-    let unreadable = |source| GltfError::Unreadable { path: path.to_owned(), source: Box::new(source) };
-    let missing = |what| GltfError::Missing { path: path.to_owned(), what };
-    let bytes = std::fs::read(path).map_err(|error| unreadable(gltf::Error::Io(error)))?;
-    let file = gltf::Gltf::from_slice(&bytes).map_err(unreadable)?;
-    let blob = file.blob.as_deref().ok_or_else(|| missing("no embedded data; save it as one binary file (.glb)"))?;
-    let data = |buffer: gltf::Buffer<'_>| matches!(buffer.source(), gltf::buffer::Source::Bin).then_some(blob);
-    let (mesh, skin) = file
-        .nodes()
-        .find_map(|node| node.mesh().zip(node.skin()))
-        .ok_or_else(|| missing("no skinned mesh; export the body with its armature"))?;
-
-    let (bones, order) =
-        bones(&skin, data).ok_or_else(|| missing("the skin has no inverse bind matrices, or cyclic joints"))?;
-    let (mut vertices, mut triangles, mut weights) = (Vec::new(), Vec::new(), Vec::new());
-    for primitive in mesh.primitives().filter(|p| p.mode() == gltf::mesh::Mode::Triangles) {
-        let reader = primitive.reader(data);
-        let first = vertices.len() as u32;
-        let positions = reader.read_positions().ok_or_else(|| missing("a primitive without positions"))?;
-        vertices.extend(positions.map(|p| Vector3::from(p).map(f64::from)));
-        let indices: Vec<u32> = match reader.read_indices() {
-            Some(indices) => indices.into_u32().collect(),
-            None => (0..vertices.len() as u32 - first).collect(),
-        };
-        triangles.extend(indices.chunks_exact(3).map(|t| [first + t[0], first + t[1], first + t[2]]));
-        let rigged = reader.read_joints(0).zip(reader.read_weights(0));
-        let (joints, amounts) = rigged.ok_or_else(|| missing("a primitive without joints and weights"))?;
-        for (joints, amounts) in joints.into_u16().zip(amounts.into_f32()) {
-            let row = joints.iter().zip(amounts).filter(|(_, amount)| *amount > 0.0);
-            let out_of_range = usize::MAX;
-            weights.push(
-                row.map(|(&j, amount)| (order.get(usize::from(j)).copied().unwrap_or(out_of_range), f64::from(amount)))
-                    .collect(),
-            );
-        }
-    }
-    SkinnedBody::new(Mesh::new(vertices, triangles), bones, weights)
-        .map_err(|source| GltfError::Body { path: path.to_owned(), source })
+    let bytes = energy_files::read(path, LARGEST_FILE)
+        .map_err(|source| GltfError::Unreadable { path: path.to_owned(), source })?;
+    parse_gltf(&bytes, path)
 }
 
-/// Returns the bones, parents first, and the bone of each joint of the skin.
-fn bones<'a>(
-    skin: &gltf::Skin<'_>,
-    data: impl Clone + Fn(gltf::Buffer<'_>) -> Option<&'a [u8]>,
-) -> Option<(Vec<Bone>, Vec<usize>)> {
-    let joints: Vec<_> = skin.joints().collect();
-    let binds: Vec<Matrix4<f64>> = skin
-        .reader(data)
-        .read_inverse_bind_matrices()?
-        .map(|columns| Matrix4::from_fn(|row, column| f64::from(columns[column][row])))
-        .collect();
-    let at = |node: usize| joints.iter().position(|joint| joint.index() == node);
-    let parents: Vec<Option<usize>> = (0..joints.len())
-        .map(|i| joints.iter().position(|j| j.children().any(|child| at(child.index()) == Some(i))))
-        .collect();
-    let head = |joint: usize| -> Option<Vector3<f64>> {
-        Some(binds.get(joint)?.try_inverse()?.transform_point(&Point3::origin()).coords)
-    };
-    let mut order = vec![usize::MAX; joints.len()];
-    let mut bones: Vec<Bone> = Vec::new();
-    while bones.len() < joints.len() {
-        let before = bones.len();
-        for joint in 0..joints.len() {
-            let parent = parents[joint];
-            if order[joint] != usize::MAX || parent.is_some_and(|parent| order[parent] == usize::MAX) {
-                continue;
+/// Reads the contents of a file as [`read_gltf`] does. `path` is used in messages.
+///
+/// # Errors
+/// As [`read_gltf`].
+///
+/// ```
+/// use std::path::Path;
+/// let error = fusion_core::body::parse_gltf(b"no glTF", Path::new("body.glb")).unwrap_err();
+/// assert!(error.to_string().starts_with("body.glb: the header: expected `glTF`"));
+/// ```
+pub fn parse_gltf(bytes: &[u8], path: &Path) -> Result<SkinnedBody, GltfError> {
+    parse(bytes).map_err(|fault| match fault {
+        Unusable::Part(Fault { part, reason }) => GltfError::Part { path: path.to_owned(), part, reason },
+        Unusable::Body(source) => GltfError::Body { path: path.to_owned(), source },
+    })
+}
+
+/// Why there is no body in a file.
+#[derive(Debug)]
+enum Unusable {
+    Part(Fault),
+    Body(BodyError),
+}
+
+impl From<Fault> for Unusable {
+    fn from(fault: Fault) -> Self {
+        Self::Part(fault)
+    }
+}
+
+fn parse(bytes: &[u8]) -> Result<SkinnedBody, Unusable> {
+    let file = Container::parse(bytes)?;
+    let mut rigged = file.root.nodes.iter().filter_map(|node| node.mesh.zip(node.skin));
+    let (mesh, skin) =
+        rigged.next().ok_or_else(|| Fault::new("the nodes", "no skinned mesh; export the body with its armature"))?;
+    let mut accessors = Accessors::new(&file);
+    let SkinBones { bones, order } = SkinBones::read(&file.root, &file.root.skins[skin.value()], &mut accessors)?;
+    let mut surface = Surface::default();
+    for (number, primitive) in file.root.meshes[mesh.value()].primitives.iter().enumerate() {
+        let within = |Fault { part, reason }| Fault::new(format!("mesh {mesh}, primitive {number}: {part}"), reason);
+        surface.add(primitive, &order, &mut accessors).map_err(within)?;
+    }
+    let Surface { vertices, triangles, weights, .. } = surface;
+    SkinnedBody::new(Mesh::new(vertices, triangles), bones, weights).map_err(Unusable::Body)
+}
+
+/// The surface of the primitives so far.
+#[derive(Debug, Default)]
+struct Surface {
+    vertices: Vec<Vector3<f64>>,
+    triangles: Vec<[u32; 3]>,
+    weights: Vec<Vec<(usize, f64)>>,
+    /// First vertex and number of vertices of accessors, which several primitives may share.
+    shared: BTreeMap<Vec<usize>, (u32, usize)>,
+}
+
+impl Surface {
+    /// Adds a primitive. Points and lines are not part of a surface.
+    fn add(&mut self, primitive: &Primitive, order: &[usize], accessors: &mut Accessors<'_>) -> Result<(), Fault> {
+        match primitive.mode {
+            Checked::Valid(Mode::Triangles) => {}
+            Checked::Valid(Mode::TriangleStrip | Mode::TriangleFan) => {
+                return Err(Fault::new("its mode", "strips and fans are not supported; export triangles"));
             }
-            let children: Vec<usize> = (0..joints.len()).filter(|&i| parents[i] == Some(joint)).collect();
-            let ends: Option<Vec<_>> = children.iter().map(|&child| head(child)).collect();
-            let ends = ends?;
-            let own = head(joint)?;
-            let tail = if ends.is_empty() { own } else { ends.iter().sum::<Vector3<f64>>() / ends.len() as f64 };
-            order[joint] = bones.len();
-            bones.push(Bone {
-                name: joints[joint].name().map_or_else(|| format!("joint {joint}"), str::to_owned),
-                parent: parent.map(|parent| order[parent]),
-                head: own.into(),
-                tail: tail.into(),
-            });
+            _ => return Ok(()),
         }
-        if bones.len() == before {
-            return None;
+        let (first, count) = self.vertices_of(primitive, order, accessors)?;
+        let corners: Vec<u32> = match primitive.indices {
+            Some(indices) => {
+                let read: Vec<[f64; 1]> = accessors.read(indices.value(), &Usage::INDICES)?;
+                read.into_iter().map(|[index]| index as u32).collect()
+            }
+            None => {
+                accessors.charge(count as u64).map_err(|reason| Fault::new("its corners", reason))?;
+                (0..count as u32).collect()
+            }
+        };
+        let fault = |reason| Fault::new("its corners", reason);
+        if let Some(index) = corners.iter().find(|&&index| index as usize >= count) {
+            return Err(fault(format!("one is vertex {index}, but there are only {count} vertices")));
+        }
+        let (triangles, rest) = corners.as_chunks::<3>();
+        if !rest.is_empty() {
+            return Err(fault(format!("expected 3 for each triangle, got {} in all", corners.len())));
+        }
+        self.triangles.extend(triangles.iter().map(|corners| corners.map(|corner| first + corner)));
+        Ok(())
+    }
+
+    /// Returns the first vertex and the number of vertices of a primitive, after adding them if they are new.
+    fn vertices_of(
+        &mut self,
+        primitive: &Primitive,
+        order: &[usize],
+        accessors: &mut Accessors<'_>,
+    ) -> Result<(u32, usize), Fault> {
+        let accessor = |semantic| primitive.attributes.get(&Checked::Valid(semantic)).map(|index| index.value());
+        let positions = accessor(Semantic::Positions).ok_or_else(|| Fault::new("its positions", "there are none"))?;
+        let mut key = vec![positions];
+        for set in 0.. {
+            match (accessor(Semantic::Joints(set)), accessor(Semantic::Weights(set))) {
+                (Some(joints), Some(weights)) => key.extend([joints, weights]),
+                (None, None) if set > 0 => break,
+                _ => return Err(Fault::new(format!("joints and weights {set}"), "expected both")),
+            }
+        }
+        if let Some(known) = self.shared.get(&key) {
+            return Ok(*known);
+        }
+        let positions: Vec<[f64; 3]> = accessors.read(positions, &Usage::POSITIONS)?;
+        let rows = skinning_rows(&key[1..], positions.len(), order, accessors)?;
+        let place = (self.vertices.len() as u32, positions.len());
+        self.vertices.extend(positions.into_iter().map(Vector3::from));
+        self.weights.extend(rows);
+        self.shared.insert(key, place);
+        Ok(place)
+    }
+}
+
+/// Reads the bones and weights of vertices from pairs of accessors.
+fn skinning_rows(
+    pairs: &[usize],
+    vertices: usize,
+    order: &[usize],
+    accessors: &mut Accessors<'_>,
+) -> Result<Vec<Vec<(usize, f64)>>, Fault> {
+    let mut rows = vec![Vec::new(); vertices];
+    let (pairs, _) = pairs.as_chunks::<2>();
+    for (set, &[joints, amounts]) in pairs.iter().enumerate() {
+        let fault = |reason: String| Fault::new(format!("joints and weights {set}"), reason);
+        let joints: Vec<[f64; 4]> = accessors.read(joints, &Usage::JOINTS)?;
+        let amounts: Vec<[f64; 4]> = accessors.read(amounts, &Usage::WEIGHTS)?;
+        if (joints.len(), amounts.len()) != (vertices, vertices) {
+            let found = format!("{} and {}", joints.len(), amounts.len());
+            return Err(fault(format!("expected one of each per vertex, {vertices}, got {found}")));
+        }
+        for (vertex, (joints, amounts)) in joints.iter().zip(&amounts).enumerate() {
+            for (&joint, &amount) in joints.iter().zip(amounts).filter(|(_, amount)| **amount != 0.0) {
+                let bone = order.get(joint as usize).ok_or_else(|| {
+                    fault(format!("vertex {vertex} has joint {joint}, but the skin has only {} joints", order.len()))
+                })?;
+                rows[vertex].push((*bone, amount));
+            }
         }
     }
-    Some((bones, order))
+    Ok(rows)
 }

@@ -1,9 +1,8 @@
 use std::collections::BTreeMap;
-use std::io::BufReader;
 use std::path::{Path, PathBuf};
 
+use mesh_obj::{ObjFile, ObjFileError};
 use nalgebra::Vector3;
-use obj::raw::object::{Polygon, parse_obj};
 use serde::Deserialize;
 
 use super::mesh::Mesh;
@@ -13,22 +12,9 @@ use crate::json_file::{JsonFileError, read_json};
 /// Files that do not describe a body.
 #[derive(Debug, thiserror::Error)]
 pub enum MakeHumanError {
-    /// The mesh cannot be read.
-    #[error("cannot read {}", .path.display())]
-    Unreadable {
-        /// Path of the file.
-        path: PathBuf,
-        /// Error of the operating system.
-        source: std::io::Error,
-    },
-    /// The mesh is malformed.
-    #[error("{}: not a Wavefront OBJ: {message}", .path.display())]
-    Mesh {
-        /// Path of the file.
-        path: PathBuf,
-        /// Error of the parser.
-        message: String,
-    },
+    /// The mesh cannot be read or is malformed.
+    #[error(transparent)]
+    Mesh(#[from] ObjFileError),
     /// The rig or the weights cannot be read or are malformed.
     #[error(transparent)]
     Json(#[from] JsonFileError),
@@ -120,26 +106,15 @@ pub fn read_makehuman(mesh: &Path, rig: &Path, weights: &Path) -> Result<Skinned
 
 impl Groups {
     fn read(path: &Path) -> Result<Self, MakeHumanError> {
-        let unreadable = |source| MakeHumanError::Unreadable { path: path.to_owned(), source };
-        let file = std::fs::File::open(path).map_err(unreadable)?;
-        let raw = parse_obj(BufReader::new(file))
-            .map_err(|error| MakeHumanError::Mesh { path: path.to_owned(), message: error.to_string() })?;
-        let positions = raw.positions.iter().map(|p| METRES * Vector3::new(p.0, p.1, p.2).map(f64::from)).collect();
-        let corners = |polygon: &Polygon| -> Vec<usize> {
-            match polygon {
-                Polygon::P(list) => list.clone(),
-                Polygon::PT(list) | Polygon::PN(list) => list.iter().map(|corner| corner.0).collect(),
-                Polygon::PTN(list) => list.iter().map(|corner| corner.0).collect(),
+        let file = ObjFile::read(path)?;
+        let positions = file.vertices.iter().map(|&p| METRES * Vector3::from(p)).collect();
+        let mut polygons: BTreeMap<String, Vec<Vec<usize>>> = BTreeMap::new();
+        for &face in &file.faces {
+            for &group in file.groups(face) {
+                let corners = file.corners(face).iter().map(|corner| corner.vertex()).collect();
+                polygons.entry(file.names[group].clone()).or_default().push(corners);
             }
-        };
-        let polygons = raw
-            .groups
-            .iter()
-            .map(|(name, group)| {
-                let ranges = group.polygons.iter().flat_map(|range| &raw.polygons[range.start..range.end]);
-                (name.clone(), ranges.map(corners).collect())
-            })
-            .collect();
+        }
         Ok(Self { path: path.to_owned(), positions, polygons })
     }
 

@@ -17,6 +17,9 @@ pub struct Bone {
     pub tail: [f64; 3],
 }
 
+/// The largest coordinate of a body, in m. Products of larger ones may overflow.
+pub const FARTHEST: f64 = 1e9;
+
 /// A body that cannot be used.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum BodyError {
@@ -33,11 +36,17 @@ pub enum BodyError {
         /// Number of vertices.
         vertices: usize,
     },
-    /// A position is infinite or NaN.
-    #[error("vertex {vertex} is not finite")]
+    /// A position is infinite, NaN or too far away.
+    #[error("vertex {vertex} is not finite, or farther than {FARTHEST:e} m from the origin")]
     NonFinite {
         /// Index of the vertex.
         vertex: usize,
+    },
+    /// An end of a bone is infinite, NaN or too far away.
+    #[error("bone `{bone}` is not finite, or farther than {FARTHEST:e} m from the origin")]
+    NonFiniteBone {
+        /// Name of the bone.
+        bone: String,
     },
     /// The numbers of weight rows and vertices differ.
     #[error("expected one row of skinning weights per vertex, got {found} rows for {vertices} vertices")]
@@ -82,8 +91,11 @@ impl SkinnedBody {
         if vertices == 0 || mesh.triangles.is_empty() {
             return Err(BodyError::Empty);
         }
-        if let Some(vertex) = mesh.vertices.iter().position(|v| !v.iter().all(|x| x.is_finite())) {
+        if let Some(vertex) = mesh.vertices.iter().position(|v| !v.iter().all(|x| x.abs() <= FARTHEST)) {
             return Err(BodyError::NonFinite { vertex });
+        }
+        if let Some(bone) = bones.iter().find(|bone| !bone.head.iter().chain(&bone.tail).all(|x| x.abs() <= FARTHEST)) {
+            return Err(BodyError::NonFiniteBone { bone: bone.name.clone() });
         }
         for (triangle, corners) in mesh.triangles.iter().enumerate() {
             if let Some(&vertex) = corners.iter().find(|&&vertex| vertex as usize >= vertices) {

@@ -1,8 +1,7 @@
-use std::io::BufReader;
 use std::path::{Path, PathBuf};
 
+use mesh_obj::{ObjFile, ObjFileError};
 use nalgebra::Vector3;
-use obj::raw::object::{Polygon, RawObj, parse_obj};
 use serde::{Deserialize, Serialize};
 
 use super::mesh::Mesh;
@@ -15,21 +14,16 @@ pub enum BodyFileError {
     /// A stored body cannot be read or written, or is malformed.
     #[error(transparent)]
     Json(#[from] JsonFileError),
-    /// The OBJ file cannot be read.
-    #[error("{}", .path.display())]
-    File {
+    /// The OBJ file cannot be read or is malformed.
+    #[error(transparent)]
+    Obj(#[from] ObjFileError),
+    /// A vertex of the OBJ file is infinite or NaN.
+    #[error("{}:{line}: the vertex is not finite", .path.display())]
+    NonFinite {
         /// Path of the file.
         path: PathBuf,
-        /// Error of the operating system.
-        source: std::io::Error,
-    },
-    /// The mesh is malformed.
-    #[error("{}: not a Wavefront OBJ: {message}", .path.display())]
-    Obj {
-        /// Path of the file.
-        path: PathBuf,
-        /// Error of the parser.
-        message: String,
+        /// The line, from 1.
+        line: u32,
     },
     /// The parts do not fit.
     #[error("{}", .path.display())]
@@ -65,8 +59,10 @@ pub fn read_body(path: &Path) -> Result<SkinnedBody, BodyFileError> {
 /// Writes a skinned body completely or not at all.
 ///
 /// # Errors
-/// If the file cannot be written.
+/// If the body's parts do not fit, as after a motion that is not finite, or the file cannot be written.
 pub fn write_body(path: &Path, body: &SkinnedBody) -> Result<(), BodyFileError> {
+    SkinnedBody::new(body.mesh.clone(), body.bones.clone(), body.weights.clone())
+        .map_err(|source| BodyFileError::Body { path: path.into(), source })?;
     let stored = Stored {
         vertices: body.mesh.vertices.iter().map(|&vertex| vertex.into()).collect(),
         triangles: body.mesh.triangles.clone(),
@@ -81,7 +77,7 @@ pub fn write_body(path: &Path, body: &SkinnedBody) -> Result<(), BodyFileError> 
 /// # Errors
 /// If the file cannot be read or is malformed.
 pub fn read_vertices(path: &Path) -> Result<Vec<Vector3<f64>>, BodyFileError> {
-    Ok(positions(&read_raw(path)?))
+    positions(&ObjFile::read(path)?, path)
 }
 
 /// Reads an OBJ file, in metres, as a body without bones. Polygons are split into triangles.
@@ -89,29 +85,23 @@ pub fn read_vertices(path: &Path) -> Result<Vec<Vector3<f64>>, BodyFileError> {
 /// # Errors
 /// If the file cannot be read, is malformed, or has no triangles.
 pub fn read_obj(path: &Path) -> Result<SkinnedBody, BodyFileError> {
-    let raw = read_raw(path)?;
-    let corners = |polygon: &Polygon| -> Vec<u32> {
-        match polygon {
-            Polygon::P(list) => list.iter().map(|&vertex| vertex as u32).collect(),
-            Polygon::PT(list) | Polygon::PN(list) => list.iter().map(|corner| corner.0 as u32).collect(),
-            Polygon::PTN(list) => list.iter().map(|corner| corner.0 as u32).collect(),
-        }
-    };
-    let polygons: Vec<Vec<u32>> = raw.polygons.iter().map(corners).collect();
-    let fan = |p: &Vec<u32>| p.windows(2).skip(1).map(|pair| [p[0], pair[0], pair[1]]).collect::<Vec<_>>();
-    let (vertices, triangles) = (positions(&raw), polygons.iter().flat_map(fan).collect());
-    SkinnedBody::without_bones(checked(vertices, triangles))
+    let file = ObjFile::read(path)?;
+    let vertices = positions(&file, path)?;
+    let mut triangles = Vec::new();
+    for &face in &file.faces {
+        let corners = file.corners(face);
+        let vertex = |corner: usize| corners[corner].vertex() as u32;
+        triangles.extend((2..corners.len()).map(|end| [vertex(0), vertex(end - 1), vertex(end)]));
+    }
+    SkinnedBody::without_bones(Mesh::new(vertices, triangles))
         .map_err(|source| BodyFileError::Body { path: path.into(), source })
 }
 
-fn read_raw(path: &Path) -> Result<RawObj, BodyFileError> {
-    let file = std::fs::File::open(path).map_err(|source| BodyFileError::File { path: path.into(), source })?;
-    parse_obj(BufReader::new(file))
-        .map_err(|error| BodyFileError::Obj { path: path.into(), message: error.to_string() })
-}
-
-fn positions(raw: &RawObj) -> Vec<Vector3<f64>> {
-    raw.positions.iter().map(|p| Vector3::new(p.0, p.1, p.2).map(f64::from)).collect()
+fn positions(file: &ObjFile, path: &Path) -> Result<Vec<Vector3<f64>>, BodyFileError> {
+    match file.vertices.iter().position(|p| !p.iter().all(|x| x.is_finite())) {
+        Some(vertex) => Err(BodyFileError::NonFinite { path: path.into(), line: file.vertex_lines[vertex] }),
+        None => Ok(file.vertices.iter().copied().map(Vector3::from).collect()),
+    }
 }
 
 /// Creates a mesh that [`SkinnedBody::new`] will check: normals need valid triangles.
@@ -140,6 +130,9 @@ mod tests {
         let empty = read_obj(&path).unwrap_err();
         assert!(matches!(&empty, BodyFileError::Body { source: BodyError::Empty, .. }), "{empty}");
         std::fs::write(&path, "v 0 0 zero\n").unwrap();
-        assert!(matches!(read_obj(&path), Err(BodyFileError::Obj { .. })));
+        let error = read_obj(&path).unwrap_err().to_string();
+        assert!(error.ends_with("square.obj:1: expected a number, got `zero`: `v 0 0 zero`"), "{error}");
+        std::fs::write(&path, "v 0 0 0\nv 0 0 nan\nv 0 1 0\nf 1 2 3\n").unwrap();
+        assert!(read_obj(&path).unwrap_err().to_string().ends_with("square.obj:2: the vertex is not finite"));
     }
 }

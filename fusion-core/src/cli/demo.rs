@@ -2,12 +2,17 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
 use clap::Args;
+use energy_cli::Interrupts;
 use fusion_core::skeleton::BoneNoise;
 
 use super::evaluate::{Evaluate, summary};
 use super::print;
 use super::render::Render;
+use super::session::{Ended, begin};
 use super::track::Track;
+
+/// The largest number of frames of a demonstration: half an hour.
+const MOST_FRAMES: u64 = 54_000;
 
 /// Options of `fusion demo`.
 #[derive(Debug, Args)]
@@ -16,12 +21,13 @@ pub struct Demo {
     #[arg(short, long, default_value = "out/fusion")]
     output: PathBuf,
     /// Frames to track, at 30 Hz.
-    #[arg(long, default_value_t = 60, value_parser = clap::builder::RangedU64ValueParser::<usize>::new().range(1..))]
+    #[arg(long, default_value_t = 60, value_parser = clap::builder::RangedU64ValueParser::<usize>::new().range(1..=MOST_FRAMES))]
     frames: usize,
 }
 
 impl Demo {
-    pub fn run(&self) -> Result<()> {
+    /// Renders, tracks and evaluates.
+    pub fn run(&self, interrupts: &Interrupts) -> Result<Ended> {
         audit()?;
         let runs = [
             ("exact bones", BoneNoise::default(), false),
@@ -32,8 +38,10 @@ impl Demo {
             print(&format!("{name}:\n"))?;
             let folder = self.output.join(name.replace(' ', "-"));
             let (recording, track) = (folder.join("recording"), folder.join("track"));
-            Render::figure(self.frames, noise, &recording).run()?;
-            Track::of(&recording, unknown_bones, &track).run()?;
+            Render::figure(self.frames, noise, &recording).run_until(interrupts.flag())?;
+            if begin(&Track::of(&recording, unknown_bones, &track), interrupts)? == Ended::Stopped {
+                return Ok(Ended::Stopped);
+            }
             rows.push((name, Evaluate::of(&recording, &track).run()?));
             // Nine tenths of the files, which can be computed again.
             for meshes in [recording.join("truth"), track.join("meshes")] {
@@ -48,7 +56,8 @@ impl Demo {
             })
             .collect();
         let table: Vec<(&str, &_)> = table.iter().map(|(name, errors)| (name.as_str(), *errors)).collect();
-        print(&format!("{}\n\n{EXPLANATION}", summary(&table)))
+        print(&format!("{}\n\n{EXPLANATION}", summary(&table)))?;
+        Ok(Ended::Complete)
     }
 }
 

@@ -19,6 +19,9 @@ use super::print;
 /// Pixels of the image per pixel of a picture, along each axis.
 const REDUCTION: usize = 2;
 
+/// The largest film that the page includes, in bytes.
+const LARGEST_FILM: u64 = 256 << 20;
+
 /// Options of `fusion evaluate`.
 #[derive(Debug, Args)]
 pub struct Evaluate {
@@ -88,7 +91,7 @@ impl Evaluate {
         }
         let film = self.track.join(FILM);
         if film.exists() {
-            let png = std::fs::read(&film).with_context(|| film.display().to_string())?;
+            let png = energy_files::read_state(&film, LARGEST_FILM).with_context(|| film.display().to_string())?;
             shown.push(Shown { caption: "all frames".into(), png });
         }
         Ok(shown)

@@ -1,5 +1,6 @@
 //! The first image shows the model at rest.
 
+use energy_cli::tell;
 use fusion_core::body::SkinnedBody;
 use fusion_core::depth::{Camera, DepthImage};
 use fusion_core::focal_length::{FocalSuggestion, check_focal_length};
@@ -13,11 +14,11 @@ pub fn compared(body: SkinnedBody, camera: &Camera, image: &DepthImage, keep_siz
     let focal = focal.filter(|focal| size.is_none_or(|size| focal.explained <= size.explained));
     match (focal, size) {
         (Some(found), _) => {
-            eprintln!("warning: {}", focal_warning(camera, &found));
+            tell(&format!("warning: {}", focal_warning(camera, &found)));
             body
         }
         (None, Some(found)) => {
-            eprintln!("warning: {}", size_warning(&found, keep_size));
+            tell(&format!("warning: {}", size_warning(&found, keep_size)));
             if keep_size { body } else { found.applied(&body) }
         }
         (None, None) => body,

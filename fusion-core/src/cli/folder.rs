@@ -1,6 +1,7 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
+use energy_files::{FolderLock, remove_parts, subfolder};
 
 /// Model in a recording.
 pub const MODEL: &str = "model.json";
@@ -11,6 +12,19 @@ pub const FRAMES: &str = "frames.csv";
 /// Node motions in a track.
 pub const NODES: &str = "nodes.json";
 
+/// Last checkpoint of a track that is not complete.
+pub const CHECKPOINT: &str = "checkpoint";
+/// The checkpoint before it.
+pub const PREVIOUS_CHECKPOINT: &str = "checkpoint.previous";
+/// Frames of a track that is not complete.
+pub const JOURNAL: &str = "checkpoint.frames";
+/// Lock of an output folder.
+const LOCK: &str = "fusion.lock";
+
+/// Folder of the moved meshes, in a track.
+pub const MESHES: &str = "meshes";
+/// Folder of the pictures, in a track.
+pub const PICTURES: &str = "pictures";
 /// Film of the pictures of a track.
 pub const FILM: &str = "track.apng";
 /// Track as Universal Scene Description.
@@ -25,7 +39,7 @@ pub const REST: &str = "rest.obj";
 
 /// Path of a frame's picture in a track.
 pub fn picture_file(folder: &Path, frame: usize) -> PathBuf {
-    folder.join("pictures").join(format!("{frame:06}.png"))
+    folder.join(PICTURES).join(format!("{frame:06}.png"))
 }
 
 /// Path of a frame's mesh in `truth`, `meshes` or `surface`.
@@ -33,15 +47,25 @@ pub fn mesh_file(folder: &Path, kind: &str, frame: usize) -> PathBuf {
     folder.join(kind).join(format!("{frame:06}.obj"))
 }
 
-/// Creates an output folder with its subfolders before anything is computed. With `overwrite`, removes the files of an
-/// earlier run, so that no folder mixes two runs.
-pub fn prepare(folder: &Path, parts: &[&str], files: &[&str], overwrite: bool) -> Result<()> {
+/// Locks an output folder until the lock is dropped; `None` if its file system has no locks. Removes the unfinished
+/// files of killed programs.
+pub fn lock(folder: &Path) -> Result<Option<FolderLock>> {
+    let lock = FolderLock::take(folder, LOCK)?;
+    remove_parts(folder).with_context(|| format!("cannot prepare {}", folder.display()))?;
+    Ok(lock)
+}
+
+/// Creates and locks an output folder with its subfolders before anything is computed. With `overwrite`, removes the
+/// files of an earlier run, so that no folder mixes two runs.
+pub fn prepare(folder: &Path, parts: &[&str], files: &[&str], overwrite: bool) -> Result<Option<FolderLock>> {
     let here = || format!("cannot prepare {}", folder.display());
     std::fs::create_dir_all(folder).with_context(here)?;
-    let mut old: Vec<PathBuf> = files.iter().map(|file| folder.join(file)).filter(|path| path.exists()).collect();
+    let lock = lock(folder)?;
+    let is_there = |path: &PathBuf| path.symlink_metadata().is_ok();
+    let mut old: Vec<PathBuf> = files.iter().map(|file| folder.join(file)).filter(is_there).collect();
     for part in parts {
-        let path = folder.join(part);
-        std::fs::create_dir_all(&path).with_context(here)?;
+        let path = subfolder(folder, part).with_context(here)?;
+        remove_parts(&path).with_context(here)?;
         for entry in std::fs::read_dir(&path).with_context(here)? {
             let path = entry.with_context(here)?.path();
             if path.extension().is_some_and(|extension| extension == "obj" || extension == "png") {
@@ -52,5 +76,6 @@ pub fn prepare(folder: &Path, parts: &[&str], files: &[&str], overwrite: bool) -
     if let (false, Some(path)) = (overwrite, old.first()) {
         bail!("{} exists; choose another folder, or allow --overwrite", path.display());
     }
-    old.iter().try_for_each(std::fs::remove_file).with_context(here)
+    old.iter().try_for_each(std::fs::remove_file).with_context(here)?;
+    Ok(lock)
 }

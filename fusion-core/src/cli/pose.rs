@@ -33,7 +33,7 @@ impl Pose {
     pub fn run(&self) -> Result<()> {
         let (body, motions) = self.source.posed()?;
         ensure!(!motions.is_empty(), "expected at least one frame between --from and --to");
-        prepare(&self.output, &[MESHES], &[], self.overwrite)?;
+        let _lock = prepare(&self.output, &[MESHES], &[], self.overwrite)?;
         let progress = progress_bar(motions.len(), "posing");
         for (frame, motions) in motions.iter().enumerate() {
             let mut posed = body.posed(motions);

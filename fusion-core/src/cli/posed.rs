@@ -4,10 +4,14 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail, ensure};
 use clap::Args;
+use energy_cli::tell;
 use fusion_core::body::{SkinnedBody, figure, figure_motion, read_body, read_gltf, read_makehuman, read_obj};
 use fusion_core::protocol::at_place_of;
 use fusion_core::skeleton::{Bvh, Retarget};
 use nalgebra::Isometry3;
+
+/// The largest number of motions of bones in all frames, each of 56 bytes: 60 bones for half an hour at 30 Hz.
+const MOST_MOTIONS: usize = 4_000_000;
 
 /// Options that choose a body and the frames of its motion.
 #[derive(Debug, Args)]
@@ -55,7 +59,8 @@ impl Source {
         ensure!(self.step > 0, "--step: expected at least 1, got {}", self.step);
         if self.body == "figure" {
             ensure!(self.motion.is_none(), "the figure has its own motion; remove --motion");
-            let last = self.to.unwrap_or(self.from + 120);
+            let last = self.to.unwrap_or(self.from.saturating_add(120));
+            self.check_count(before, last, figure().bones.len())?;
             let motions = self.frames(before, last).map(|frame| figure_motion(frame as f64 / 30.0)).collect();
             return Ok((figure(), motions));
         }
@@ -65,17 +70,29 @@ impl Source {
         let retarget = Retarget::new(&body.bones, &motion)?;
         let missing: Vec<&str> = retarget.missing().collect();
         if !missing.is_empty() {
-            eprintln!(
+            tell(&format!(
                 "warning: {} has no joint for {}: they move with their parents",
                 path.display(),
                 missing.join(", ")
-            );
+            ));
         }
         let last = self.to.unwrap_or(motion.frames() - 1);
         ensure!(last < motion.frames(), "--to {last}: {} has {} frames", path.display(), motion.frames());
+        self.check_count(before, last, body.bones.len())?;
         let motions: Result<_, _> = self.frames(before, last).map(|frame| retarget.motions(frame)).collect();
         let motions = motions?;
         Ok((body, motions))
+    }
+
+    /// Checks that the motions of all frames fit into memory.
+    fn check_count(&self, before: &[usize], last: usize, bones: usize) -> Result<()> {
+        let most = MOST_MOTIONS / bones.max(1);
+        let count = last.checked_sub(self.from).map_or(0, |span| span / self.step).saturating_add(1 + before.len());
+        ensure!(
+            count <= most,
+            "{count} frames of {bones} bones: expected at most {most}; choose fewer by --from, --to and --step"
+        );
+        Ok(())
     }
 
     fn frames(&self, before: &[usize], last: usize) -> impl Iterator<Item = usize> {

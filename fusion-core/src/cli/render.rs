@@ -1,5 +1,6 @@
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use anyhow::{Result, ensure};
 use clap::Args;
@@ -60,7 +61,13 @@ impl Render {
         }
     }
 
+    /// Renders all frames.
     pub fn run(&self) -> Result<()> {
+        self.run_until(&AtomicBool::new(false))
+    }
+
+    /// Renders all frames, or until `stop` is set.
+    pub fn run_until(&self, stop: &AtomicBool) -> Result<()> {
         ensure!(
             self.distance > 0.0 && self.distance.is_finite(),
             "--distance: expected more than 0 m, got {} m",
@@ -75,8 +82,8 @@ impl Render {
         ensure!(motions.len() > 1, "expected at least two frames between --from and --to");
         let recording = Recording::new(&body, &motions, Camera::VGA, self.distance);
         let files = [MODEL, SKELETON, DepthSequence::INTRINSICS, DepthSequence::LIST];
-        prepare(&self.output, &["depth", "truth"], &files, self.overwrite)?;
-        self.write(&recording)?;
+        let _lock = prepare(&self.output, &["depth", "truth"], &files, self.overwrite)?;
+        self.write(&recording, stop)?;
         print(&format!(
             "wrote {} frames of {} vertices and {} bones to {}\n",
             recording.motions.len(),
@@ -86,7 +93,7 @@ impl Render {
         ))
     }
 
-    fn write(&self, recording: &Recording) -> Result<()> {
+    fn write(&self, recording: &Recording, stop: &AtomicBool) -> Result<()> {
         let folder = &self.output;
         let info = SequenceInfo { camera: recording.camera, depth_scale: PER_METRE };
         write_file(&folder.join(DepthSequence::INTRINSICS), &serde_json::to_vec_pretty(&info)?)?;
@@ -97,6 +104,7 @@ impl Render {
         let mut list = String::from("# timestamp filename\n");
         let progress = progress_bar(recording.motions.len(), "rendering");
         for frame in 0..recording.motions.len() {
+            ensure!(!stop.load(Ordering::Relaxed), "stopped after frame {frame}");
             let name = format!("depth/{frame:06}.png");
             write_depth(&folder.join(&name), &recording.image(frame, sensor), PER_METRE)?;
             writeln!(list, "{:.6} {name}", frame as f64 / 30.0)?;

@@ -22,10 +22,10 @@ impl SurfaceOutput {
         Ok(Self { volume: SurfaceVolume::new(model, surface)?, options })
     }
 
-    /// Adds the image of a tracked frame.
-    pub fn add(&mut self, tracker: &Tracker, image: &DepthImage) {
+    /// Adds the image of a tracked frame, in which the nodes had these twists.
+    pub fn add(&mut self, tracker: &Tracker, twists: &[Twist], image: &DepthImage) {
         let reach = self.options.gates.normal_reach;
-        self.volume.integrate(tracker.model(), &tracker.vertex_motions(), image, tracker.rays(), reach);
+        self.volume.integrate(tracker.model(), &tracker.vertex_motions_at(twists), image, tracker.rays(), reach);
     }
 
     /// Writes the surface, in the camera's coordinates. Returns the number of its vertices.

@@ -1,33 +1,36 @@
 use std::path::{Path, PathBuf};
-use std::time::Instant;
 
 use anyhow::{Context, Result, bail};
 use clap::Args;
-use energy_cli::write_file;
-use fusion_core::body::{Bone, SkinnedBody, obj_text};
-use fusion_core::depth::{DepthImage, DepthSequence, GivenCamera, SequenceError};
+use energy_cli::tell;
+use energy_files::FolderLock;
+use fusion_core::body::{Bone, SkinnedBody};
+use fusion_core::depth::{DepthSequence, GivenCamera};
 use fusion_core::energy::BoneMode;
 use fusion_core::model::{DeformationModel, ModelOptions};
 use fusion_core::skeleton::{JointTrack, Skeleton, half_interval};
 use fusion_core::surface::SurfaceOptions;
-use fusion_core::tracker::{FrameReport, Tracker, TrackerOptions};
-use fusion_core::twist::Twist;
+use fusion_core::tracker::{Tracker, TrackerOptions};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use super::first_image::compared;
-use super::folder::{FILM, FRAMES, GLTF, MODEL, NODES, SKELETON, SURFACE, USD, mesh_file, prepare};
+use super::folder::{
+    CHECKPOINT, FILM, FRAMES, GLTF, JOURNAL, MESHES, MODEL, NODES, PICTURES, PREVIOUS_CHECKPOINT, SKELETON, SURFACE,
+    USD, prepare,
+};
 use super::posed::read_any_body;
-use super::surface_output::SurfaceOutput;
 use super::track_output::TrackOutput;
-use super::{print, progress_bar};
+
+/// Files of a track, besides those in its folders.
+const FILES: [&str; 8] = [FRAMES, NODES, FILM, USD, GLTF, CHECKPOINT, PREVIOUS_CHECKPOINT, JOURNAL];
 
 /// Options of `fusion track`.
-#[derive(Debug, Args)]
+#[derive(Clone, Debug, Args, Serialize, Deserialize)]
 pub struct Track {
     /// Folder of depth images with `intrinsics.json`, and `depth.txt` or `depth/*.png`. The first image shows the model
     /// at rest.
-    recording: PathBuf,
+    pub recording: PathBuf,
     /// Camera of a folder without `intrinsics.json`: fx,fy,cx,cy in pixels, or freiburg1, freiburg2 or freiburg3 for
     /// the calibrated cameras of the TUM's RGB-D sequences.
     #[arg(long)]
@@ -56,10 +59,10 @@ pub struct Track {
     options: Option<PathBuf>,
     /// Output folder.
     #[arg(short, long)]
-    output: PathBuf,
+    pub output: PathBuf,
     /// Write a picture of depth, model and error for each frame, and a film of them (`track.apng`).
     #[arg(long)]
-    pictures: bool,
+    pub pictures: bool,
     /// Write the moved mesh as Universal Scene Description (`track.usda`), with a time sample per frame.
     #[arg(long)]
     usd: bool,
@@ -70,67 +73,39 @@ pub struct Track {
     /// Fuse the images into a surface (`surface/rest.obj`, and `surface/*.obj` for each frame). Nodes are stiffer then,
     /// so that details stay in the surface.
     #[arg(long)]
-    surface: bool,
+    pub surface: bool,
     /// Keep the model's size, even if another size agrees better with the first image.
     #[arg(long)]
     keep_size: bool,
     /// Print the times of frames.
     #[arg(long)]
-    stats: bool,
+    pub stats: bool,
     /// Replace an earlier track.
     #[arg(long)]
+    #[serde(skip)]
     overwrite: bool,
 }
+
+/// The largest file of options, in bytes.
+const LARGEST_OPTIONS: u64 = 1 << 20;
 
 /// Options in a file.
 #[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
-struct Parameters {
+pub struct Parameters {
     model: ModelOptions,
-    tracker: TrackerOptions,
-    surface: SurfaceOptions,
+    pub tracker: TrackerOptions,
+    pub surface: SurfaceOptions,
 }
 
-/// A row of the table of frames.
-#[derive(Debug, Default, Serialize)]
-struct Line {
-    frame: usize,
-    status: &'static str,
-    matches: usize,
-    iterations: usize,
-    energy: f64,
-    nonrigid: f64,
-    graph: f64,
-    binding: f64,
-    skeleton: f64,
-    prior: f64,
-    joints: f64,
-    /// Empty if the image was used.
-    reason: String,
-    visible: f64,
-    inliers: f64,
-    residual_mm: f64,
-    /// Time of the frame without reading and writing files.
-    time_ms: f64,
-}
-
-impl Line {
-    /// Whether the image was used.
-    fn is_tracked(&self) -> bool {
-        self.reason.is_empty()
-    }
-}
-
-/// Motions of the nodes.
-#[derive(Serialize)]
-struct NodeMotions<'a> {
-    /// Origin of the twists' rotations, in the camera's coordinates, in m.
-    origin: [f64; 3],
-    angle: fusion_core::twist::AngleConvention,
-    /// Positions at rest, relative to the origin.
-    nodes: Vec<[f64; 3]>,
-    /// Twists by frame, then node.
-    frames: &'a [Vec<Twist>],
+/// Everything that a track needs before its first frame.
+pub struct Inputs {
+    pub sequence: DepthSequence,
+    pub body: SkinnedBody,
+    pub parameters: Parameters,
+    /// Bones for each image; `None` without.
+    pub skeleton: Option<Skeleton>,
+    pub tracker: Tracker,
 }
 
 impl Track {
@@ -157,13 +132,15 @@ impl Track {
         }
     }
 
-    /// # Errors
-    /// If an input cannot be used, or no image could be tracked. In the latter case the table of frames has the
-    /// reasons.
-    pub fn run(&self) -> Result<()> {
+    /// Creates and locks the output folder, and removes the files of an earlier track if that is allowed.
+    pub fn prepare(&self) -> Result<Option<FolderLock>> {
+        prepare(&self.output, &self.subfolders(), &FILES, self.overwrite)
+    }
+
+    /// Reads and checks all inputs.
+    pub fn inputs(&self) -> Result<Inputs> {
         let sequence = DepthSequence::open_with(&self.recording, self.given_camera())?;
-        let model = self.model.clone().unwrap_or_else(|| self.recording.join(MODEL));
-        let body = read_any_body(&model).context("the model")?;
+        let body = read_any_body(&self.model_path()).context("the model")?;
         let camera = sequence.info.camera;
         // The first image shows the model at rest.
         let body = match sequence.image(0) {
@@ -171,68 +148,66 @@ impl Track {
             Err(_) => body,
         };
         let parameters = self.parameters(&body)?;
-        parameters.surface.validate()?;
-        let model = DeformationModel::new(&body, parameters.model)?;
+        let of_options = || self.options.as_ref().map_or("the options".into(), |path| path.display().to_string());
+        parameters.surface.validate().with_context(of_options)?;
+        parameters.tracker.validate().with_context(of_options)?;
+        let model = DeformationModel::new(&body, parameters.model).with_context(of_options)?;
         if !model.fill.left.is_empty() {
-            eprintln!("warning: {} nodes follow no bone: no attached node can be reached", model.fill.left.len());
+            tell(&format!("warning: {} nodes follow no bone: no attached node can be reached", model.fill.left.len()));
         }
         let skeleton = self.skeleton(&sequence, &body.bones)?;
-        let mut tracker = Tracker::new(model, camera, parameters.tracker)
+        let tracker = Tracker::new(model, camera, parameters.tracker)
             .with_context(|| self.recording.join(DepthSequence::INTRINSICS).display().to_string())?;
-        let mut surface = self
-            .surface
-            .then(|| SurfaceOutput::new(tracker.model(), parameters.surface, parameters.tracker))
-            .transpose()?;
-        let mut output = self.track_output(&sequence, &body)?;
-        let mut lines: Vec<Line> = Vec::new();
-        let mut motions = Vec::new();
-        let progress = progress_bar(sequence.len(), "tracking");
-        for frame in 0..sequence.len() {
-            let image = sequence.image(frame);
-            let kept = image.as_ref().ok().filter(|_| self.pictures || self.surface).cloned();
-            let line = track_frame(frame, image, skeleton.as_ref(), &mut tracker);
-            if let Some(warning) = change(lines.last(), &line) {
-                progress.suspend(|| eprintln!("warning: {warning}"));
-            }
-            if let (Some(surface), Some(image)) = (&mut surface, kept.as_ref().filter(|_| line.is_tracked())) {
-                surface.add(&tracker, image);
-            }
-            lines.push(line);
-            let vertices = tracker.vertices();
-            output.add(frame, kept.as_ref().filter(|_| self.pictures), &vertices)?;
-            let mesh = obj_text(&vertices, &body.mesh.triangles);
-            write_file(&mesh_file(&self.output, "meshes", frame), mesh.as_bytes())?;
-            motions.push(tracker.twists().to_vec());
-            progress.inc(1);
-        }
-        progress.finish_and_clear();
-        self.write(&lines, &motions, &tracker, parameters.tracker)?;
-        let fused = surface.map(|surface| surface.write(&self.output, tracker.model(), &motions)).transpose()?;
-        // Last, because the size of a glTF file has a limit.
-        output.finish()?;
-        let skipped = lines.iter().filter(|line| !line.is_tracked()).count();
-        let tracked = lines.len() - skipped;
-        if let (0, Some(first)) = (tracked, lines.first()) {
-            let table = self.output.join(FRAMES);
-            bail!("none of {skipped} frames could be tracked; see {}; the first: {}", table.display(), first.reason);
-        }
-        print(&format!(
-            "tracked {tracked} frames with {} nodes, skipped {skipped}; wrote {}\n",
-            tracker.model().nodes.len(),
-            self.output.display()
-        ))?;
-        if let Some(vertices) = fused {
-            print(&format!("fused a surface of {vertices} vertices: {}\n", self.output.join(SURFACE).display()))?;
-        }
-        if self.stats { print(&times(&lines)) } else { Ok(()) }
+        Ok(Inputs { sequence, body, parameters, skeleton, tracker })
     }
 
-    /// Prepares the output folder.
-    fn track_output(&self, sequence: &DepthSequence, body: &SkinnedBody) -> Result<TrackOutput> {
-        let optional = [(self.pictures, "pictures"), (self.surface, SURFACE)];
-        let wanted = optional.iter().filter(|(wanted, _)| *wanted).map(|(_, folder)| *folder);
-        let folders: Vec<&str> = std::iter::once("meshes").chain(wanted).collect();
-        prepare(&self.output, &folders, &[FRAMES, NODES, FILM, USD, GLTF], self.overwrite)?;
+    fn model_path(&self) -> PathBuf {
+        self.model.clone().unwrap_or_else(|| self.recording.join(MODEL))
+    }
+
+    /// Returns the same options with absolute paths, so that the track can be resumed from elsewhere.
+    pub fn absolute(&self) -> Result<Self> {
+        let absolute = |path: &Path| std::path::absolute(path).with_context(|| path.display().to_string());
+        let optional = |path: &Option<PathBuf>| path.as_deref().map(absolute).transpose();
+        Ok(Self {
+            recording: absolute(&self.recording)?,
+            model: optional(&self.model)?,
+            skeleton: optional(&self.skeleton)?,
+            joints: optional(&self.joints)?,
+            options: optional(&self.options)?,
+            output: absolute(&self.output)?,
+            ..self.clone()
+        })
+    }
+
+    /// Returns the files that the track reads, without the images.
+    pub fn input_files(&self) -> Vec<PathBuf> {
+        let own = [DepthSequence::INTRINSICS, DepthSequence::LIST].map(|name| self.recording.join(name));
+        let bones = match &self.joints {
+            Some(joints) => joints.clone(),
+            None => self.skeleton.clone().unwrap_or_else(|| self.recording.join(SKELETON)),
+        };
+        let model = self.model_path();
+        // A model in several files.
+        let parts = std::fs::read_dir(&model).into_iter().flatten().flatten().map(|entry| entry.path());
+        let mut files: Vec<PathBuf> = own.into_iter().chain([bones]).chain(self.options.clone()).chain(parts).collect();
+        files.push(model);
+        files.sort();
+        files
+    }
+
+    /// Returns the names of the folders in the output folder.
+    fn subfolders(&self) -> Vec<&'static str> {
+        let optional = [(self.pictures, PICTURES), (self.surface, SURFACE)];
+        let wanted = optional.into_iter().filter(|(wanted, _)| *wanted).map(|(_, folder)| folder);
+        std::iter::once(MESHES).chain(wanted).collect()
+    }
+
+    /// Begins the files that were asked for.
+    pub fn track_output(&self, sequence: &DepthSequence, body: &SkinnedBody) -> Result<TrackOutput> {
+        for folder in self.subfolders() {
+            energy_files::subfolder(&self.output, folder).context("cannot prepare the output folder")?;
+        }
         let mut output = TrackOutput::new(&self.output, sequence.info.camera, &body.mesh.triangles, sequence.times());
         if self.pictures {
             output = output.with_pictures();
@@ -262,13 +237,13 @@ impl Track {
         let without: Vec<usize> = (0..images).filter(|&frame| skeleton.frames[frame].is_empty()).collect();
         if !without.is_empty() {
             let reach = times.map_or(0.0, half_interval);
-            eprintln!(
+            tell(&format!(
                 "warning: {} has no bones for frames {} (timestamps match within {:.1} ms); these are tracked without \
                  bones",
                 path.display(),
                 ranges(&without),
                 1e3 * reach
-            );
+            ));
         }
         Ok(Some(skeleton))
     }
@@ -291,7 +266,7 @@ impl Track {
                 );
             }
             (None, None) => {
-                eprintln!("warning: {} does not exist; tracking without bones", default.display());
+                tell(&format!("warning: {} does not exist; tracking without bones", default.display()));
                 return Ok(None);
             }
         };
@@ -312,7 +287,7 @@ impl Track {
         }
         let Some(path) = &self.options else { return Ok(defaults) };
         let here = || path.display().to_string();
-        let text = std::fs::read_to_string(path).with_context(here)?;
+        let text = energy_files::read_text(path, LARGEST_OPTIONS).with_context(here)?;
         // Reports an unknown key or a wrong type with its position.
         serde_json::from_str::<Parameters>(&text).with_context(here)?;
         let mut all = serde_json::to_value(defaults)?;
@@ -322,20 +297,6 @@ impl Track {
             parameters.tracker.energy.bones = BoneMode::Unknown;
         }
         Ok(parameters)
-    }
-
-    fn write(&self, lines: &[Line], motions: &[Vec<Twist>], tracker: &Tracker, options: TrackerOptions) -> Result<()> {
-        let mut table = csv::Writer::from_writer(Vec::new());
-        lines.iter().try_for_each(|line| table.serialize(line))?;
-        write_file(&self.output.join(FRAMES), &table.into_inner()?)?;
-        let model = tracker.model();
-        let nodes = NodeMotions {
-            origin: model.origin.into(),
-            angle: options.energy.angle,
-            nodes: model.nodes.iter().map(|&node| node.into()).collect(),
-            frames: &motions.iter().map(|frame| frame.iter().map(rounded).collect()).collect::<Vec<_>>(),
-        };
-        write_file(&self.output.join(NODES), &serde_json::to_vec(&nodes)?)
     }
 }
 
@@ -352,11 +313,6 @@ fn ranges(numbers: &[usize]) -> String {
     runs.join(", ")
 }
 
-/// Rounds a twist to nanometres and nanoradians, which halves the size of the file.
-fn rounded(twist: &Twist) -> Twist {
-    twist.map(|x| (1e9 * x).round() / 1e9)
-}
-
 /// Replaces the values that another object has, at any depth.
 fn replace(value: &mut Value, by: Value) {
     match (value, by) {
@@ -366,98 +322,5 @@ fn replace(value: &mut Value, by: Value) {
             }
         }
         (value, by) => *value = by,
-    }
-}
-
-/// Tracks one frame. If its image cannot be used, the body moves by its bones or its last motion, and the row has the
-/// reason.
-fn track_frame(
-    frame: usize,
-    image: Result<DepthImage, SequenceError>,
-    skeleton: Option<&Skeleton>,
-    tracker: &mut Tracker,
-) -> Line {
-    let skipped =
-        |error: &anyhow::Error| Line { frame, status: "skipped", reason: format!("{error:#}"), ..Line::default() };
-    let bones = skeleton.map_or(Ok(None), |skeleton| skeleton.motions(frame, &tracker.model().bones));
-    let (bones, fault) = match bones {
-        Ok(bones) => (bones, None),
-        Err(error) => (None, Some(anyhow::Error::new(error))),
-    };
-    let image = match fault {
-        None => image.map_err(anyhow::Error::new),
-        Some(fault) => Err(fault),
-    };
-    match image {
-        Ok(image) => {
-            let start = Instant::now();
-            let result = tracker.track(&image, bones.as_deref());
-            let time_ms = 1e3 * start.elapsed().as_secs_f64();
-            match result {
-                Ok(report) => Line { time_ms, ..line(frame, &report) },
-                Err(error) => Line { time_ms, ..skipped(&error.into()) },
-            }
-        }
-        Err(error) => {
-            let moved = tracker.predict(bones.as_deref());
-            skipped(&moved.err().map_or(error, anyhow::Error::new))
-        }
-    }
-}
-
-/// Summarises the times of the tracked frames.
-fn times(lines: &[Line]) -> String {
-    let mut times: Vec<f64> = lines.iter().filter(|line| line.is_tracked()).map(|line| line.time_ms).collect();
-    times.sort_by(f64::total_cmp);
-    let quantile = |q: f64| times.get((q * times.len().saturating_sub(1) as f64).round() as usize).unwrap_or(&0.0);
-    let mean = times.iter().sum::<f64>() / times.len().max(1) as f64;
-    format!(
-        "time per frame: mean {mean:.1} ms ({:.0} Hz), median {:.1} ms, 95 % {:.1} ms, longest {:.1} ms\n",
-        1e3 / mean,
-        quantile(0.5),
-        quantile(0.95),
-        quantile(1.0)
-    )
-}
-
-/// Describes the loss or the recovery of the track from one frame to the next; `None` without either.
-fn change(before: Option<&Line>, now: &Line) -> Option<String> {
-    match (before.is_none_or(Line::is_tracked), now.is_tracked()) {
-        (true, false) => Some(format!(
-            "track lost in frame {}: {}; following the bones, or the last motion without bones",
-            now.frame, now.reason
-        )),
-        (false, true) => Some(format!(
-            "track recovered in frame {}: {:.0} % of the visible vertices match, {:.1} mm from the surface",
-            now.frame,
-            100.0 * now.inliers,
-            now.residual_mm
-        )),
-        _ => None,
-    }
-}
-
-fn line(frame: usize, report: &FrameReport) -> Line {
-    let last = report.iterations.last();
-    let of = |name: &str| {
-        last.and_then(|step| step.terms.iter().find(|term| term.name == name)).map_or(0.0, |term| term.energy)
-    };
-    Line {
-        frame,
-        status: "tracked",
-        matches: report.counts.matched,
-        iterations: report.iterations.len(),
-        energy: last.map_or(0.0, |step| step.after),
-        nonrigid: of("nonrigid"),
-        graph: of("graph"),
-        binding: of("binding"),
-        skeleton: report.skeleton_energy.unwrap_or_else(|| of("skeleton")),
-        prior: of("prior"),
-        joints: of("joints"),
-        reason: String::new(),
-        visible: report.quality.visible,
-        inliers: report.quality.inliers,
-        residual_mm: 1e3 * report.quality.residual,
-        time_ms: 0.0,
     }
 }

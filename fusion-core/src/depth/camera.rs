@@ -3,6 +3,9 @@ use serde::{Deserialize, Serialize};
 
 use super::distortion::Distortion;
 
+/// The largest number of pixels of an image: a little more than 4K has.
+pub const MOST_PIXELS: usize = 1 << 23;
+
 /// A camera: x to the right, y down, z into the scene. Pixel centres have integer coordinates.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Camera {
@@ -74,15 +77,19 @@ impl Camera {
     /// Returns a description of an invalid parameter; `None` if all are valid.
     #[must_use]
     pub fn fault(&self) -> Option<&'static str> {
-        let positive = |x: f64| x > 0.0 && x.is_finite();
-        if !(positive(self.fx) && positive(self.fy)) {
-            return Some("expected focal lengths greater than 0");
+        // Beyond these, products of coordinates may overflow.
+        let fits = |focal_length: f64| (1e-3..=1e9).contains(&focal_length);
+        if !(fits(self.fx) && fits(self.fy)) {
+            return Some("expected focal lengths greater than 0: from 0.001 to 1e9 pixels");
         }
-        if !(self.cx.is_finite() && self.cy.is_finite()) {
-            return Some("expected a finite principal point");
+        if !(self.cx.abs() <= 1e9 && self.cy.abs() <= 1e9) {
+            return Some("expected a finite principal point, up to 1e9 pixels");
         }
         if self.distortion.is_some_and(|lens| !lens.is_finite()) {
             return Some("expected finite coefficients of the distortion");
+        }
+        if self.width.saturating_mul(self.height) > MOST_PIXELS {
+            return Some("expected an image of at most 8388608 pixels");
         }
         (self.width == 0 || self.height == 0).then_some("expected an image with at least one pixel")
     }

@@ -55,7 +55,7 @@ impl SequenceInfo {
 
 /// A camera for a sequence without `intrinsics.json`, such as those that the TUM publishes. The size of the image is
 /// that of the first one.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct GivenCamera {
     /// Focal lengths fx and fy, in pixels.
     pub focal: [f64; 2],

@@ -10,7 +10,7 @@ mod png_file;
 mod render;
 mod sequence;
 
-pub use camera::Camera;
+pub use camera::{Camera, MOST_PIXELS};
 pub use distortion::{Distortion, DistortionCoefficients};
 pub use image::DepthImage;
 pub use intrinsics::{CameraNameError, GivenCamera, SequenceInfo};

@@ -1,9 +1,14 @@
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
+
+use energy_files::excerpt;
 
 use super::image::DepthImage;
 use super::intrinsics::{GivenCamera, SequenceInfo};
 use super::png_file::{DepthFileError, read_depth, read_mask};
 use crate::json_file::{JsonFileError, read_json};
+
+/// The largest list of images, in bytes.
+const LARGEST_LIST: u64 = 64 << 20;
 
 /// A folder that is not a sequence of depth images.
 #[derive(Debug, thiserror::Error)]
@@ -81,15 +86,15 @@ pub enum SequenceError {
     /// An image cannot be read.
     #[error(transparent)]
     Image(#[from] DepthFileError),
-    /// The size of an image or its mask differs from the camera's.
-    #[error("{}: expected {expected:?} pixels as in the camera, got {found:?}", .path.display())]
-    Size {
-        /// Path of the image.
+    /// A line of the list of images names a file outside the folder.
+    #[error("{}:{line}: expected a path inside the folder, got `{found}`", .path.display())]
+    Outside {
+        /// Path of the list.
         path: PathBuf,
-        /// Size of the camera.
-        expected: [usize; 2],
-        /// Size of the image.
-        found: [usize; 2],
+        /// Line number, from 1.
+        line: usize,
+        /// The path.
+        found: String,
     },
 }
 
@@ -133,7 +138,7 @@ impl DepthSequence {
             return Err(SequenceError::TwoCameras { path });
         }
         let list = folder.join(Self::LIST);
-        let (images, times) = match std::fs::read_to_string(&list) {
+        let (images, times) = match energy_files::read_text(&list, LARGEST_LIST) {
             Ok(text) => {
                 let (times, images) = listed(&list, &text)?.into_iter().unzip();
                 (images, Some(times))
@@ -179,18 +184,11 @@ impl DepthSequence {
     /// If the image is missing, or has another format or size.
     pub fn image(&self, frame: usize) -> Result<DepthImage, SequenceError> {
         let path = self.folder.join(&self.images[frame]);
-        let mut image = read_depth(&path, self.info.depth_scale)?;
-        let expected = [self.info.camera.width, self.info.camera.height];
-        let check = |path: &Path, found: [usize; 2]| {
-            let path = path.to_owned();
-            if found == expected { Ok(()) } else { Err(SequenceError::Size { path, expected, found }) }
-        };
-        check(&path, [image.width, image.height])?;
+        let size = [self.info.camera.width, self.info.camera.height];
+        let mut image = read_depth(&path, self.info.depth_scale, Some(size))?;
         let mask = self.folder.join("mask").join(self.images[frame].file_name().unwrap_or_default());
         if mask.exists() {
-            let (width, height, pixels) = read_mask(&mask)?;
-            check(&mask, [width, height])?;
-            image.mask(&pixels);
+            image.mask(&read_mask(&mask, size)?);
         }
         Ok(image)
     }
@@ -200,7 +198,7 @@ impl DepthSequence {
 fn sized(folder: &Path, images: &[PathBuf], given: GivenCamera) -> Result<SequenceInfo, SequenceError> {
     let mut first = None;
     for image in images {
-        match read_depth(&folder.join(image), given.depth_scale) {
+        match read_depth(&folder.join(image), given.depth_scale, None) {
             Ok(image) => return Ok(given.with_size(image.width, image.height)),
             Err(error) => first = first.or(Some(error)),
         }
@@ -221,8 +219,11 @@ fn listed(path: &Path, text: &str) -> Result<Vec<(f64, PathBuf)>, SequenceError>
         let mut words = line.split_whitespace();
         let time = words.next().and_then(|word| word.parse::<f64>().ok()).filter(|time| time.is_finite());
         let (Some(found), Some(file)) = (time, words.next()) else {
-            return Err(SequenceError::List { path: path.to_owned(), line: at + 1, found: line.to_owned() });
+            return Err(SequenceError::List { path: path.to_owned(), line: at + 1, found: excerpt(line).into() });
         };
+        if !Path::new(file).components().all(|part| matches!(part, Component::Normal(_) | Component::CurDir)) {
+            return Err(SequenceError::Outside { path: path.to_owned(), line: at + 1, found: excerpt(file).into() });
+        }
         if let Some(&(last, _)) = all.last().filter(|(last, _)| *last >= found) {
             return Err(SequenceError::Order { path: path.to_owned(), line: at + 1, last, found });
         }

@@ -1,6 +1,12 @@
 use std::path::{Path, PathBuf};
 
+use energy_files::excerpt;
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
+
+/// The largest file, in bytes: hours of motion at 30 Hz.
+const LARGEST_FILE: u64 = 256 << 20;
+/// The largest number in a file, in degrees or its unit of length. Products of larger ones may overflow.
+const LARGEST_NUMBER: f64 = 1e9;
 
 /// A file that is not a BVH motion.
 #[derive(Debug, thiserror::Error)]
@@ -53,7 +59,9 @@ pub struct Bvh {
     pub ends: Vec<(usize, Vector3<f64>)>,
     /// Seconds per frame.
     pub frame_time: f64,
-    frames: Vec<Vec<f64>>,
+    /// The numbers of all frames, one frame after the other.
+    numbers: Vec<f64>,
+    frame_count: usize,
 }
 
 impl Bvh {
@@ -62,8 +70,8 @@ impl Bvh {
     /// # Errors
     /// If the file cannot be read, or is malformed; the error has the line.
     pub fn read(path: &Path) -> Result<Self, BvhError> {
-        let text =
-            std::fs::read_to_string(path).map_err(|source| BvhError::Unreadable { path: path.to_owned(), source })?;
+        let text = energy_files::read_text(path, LARGEST_FILE)
+            .map_err(|source| BvhError::Unreadable { path: path.to_owned(), source })?;
         Self::parse(&text).map_err(|(line, message)| BvhError::Malformed {
             path: path.to_owned(),
             line: line + 1,
@@ -78,40 +86,47 @@ impl Bvh {
         let (joints, ends) = hierarchy(&lines, &mut at)?;
         let value = |at: usize, key: &str| -> Result<f64, (usize, String)> {
             let rest = lines.get(at).and_then(|line| line.trim().strip_prefix(key));
-            let number = rest.and_then(|rest| rest.trim().parse::<f64>().ok());
-            number.ok_or_else(|| (at, format!("expected `{key}` and a number")))
+            let number = rest.and_then(|rest| finite(rest.trim()).ok());
+            number.ok_or_else(|| (at, format!("expected `{key}` and a finite number")))
         };
         let count = value(at, "Frames:")?;
         let frame_time = value(at + 1, "Frame Time:")?;
-        if !(frame_time > 0.0 && frame_time.is_finite()) {
+        if frame_time <= 0.0 {
             return Err((at + 1, "expected a frame time greater than 0".into()));
         }
         let channels: usize = joints.iter().map(|joint| joint.channels.len()).sum();
-        let mut frames = Vec::new();
+        let (mut numbers, mut frame_count) = (Vec::new(), 0_usize);
         for (number, line) in lines.iter().enumerate().skip(at + 2).filter(|(_, line)| !line.trim().is_empty()) {
-            let numbers: Result<Vec<f64>, _> = line.split_whitespace().map(str::parse::<f64>).collect();
-            let numbers = numbers.map_err(|error| (number, error.to_string()))?;
-            if numbers.len() != channels || numbers.iter().any(|x| !x.is_finite()) {
-                return Err((number, format!("expected {channels} finite numbers, got {}", numbers.len())));
+            let start = numbers.len();
+            for word in line.split_whitespace() {
+                numbers.push(finite(word).map_err(|message| (number, message))?);
             }
-            frames.push(numbers);
+            let found = numbers.len() - start;
+            if found != channels {
+                return Err((number, format!("expected {channels} numbers, one per channel, got {found}")));
+            }
+            frame_count += 1;
         }
-        if frames.len() as f64 != count {
-            return Err((lines.len(), format!("expected {count} frames, got {}", frames.len())));
+        if frame_count as f64 != count {
+            return Err((lines.len(), format!("expected {count:?} frames, got {frame_count}")));
         }
-        Ok(Self { joints, ends, frame_time, frames })
+        Ok(Self { joints, ends, frame_time, numbers, frame_count })
     }
 
     /// Returns the number of frames.
     #[must_use]
     pub fn frames(&self) -> usize {
-        self.frames.len()
+        self.frame_count
     }
 
     /// Returns position and rotation of each joint in a frame, in the file's unit; `None` past the last frame.
     #[must_use]
     pub fn pose(&self, frame: usize) -> Option<Vec<Isometry3<f64>>> {
-        let mut numbers = self.frames.get(frame)?.iter();
+        let channels = self.numbers.len() / self.frame_count.max(1);
+        let mut numbers = self.numbers.get(frame.checked_mul(channels)?..)?.get(..channels)?.iter();
+        if frame >= self.frame_count {
+            return None;
+        }
         let mut pose: Vec<Isometry3<f64>> = Vec::with_capacity(self.joints.len());
         for joint in &self.joints {
             let (mut shift, mut rotation) = (joint.offset, UnitQuaternion::identity());
@@ -163,7 +178,8 @@ fn hierarchy(lines: &[&str], at: &mut usize) -> Result<(Vec<Joint>, Ends), (usiz
                 open.pop().ok_or_else(|| wrong("a `}` too many"))?;
             }
             ["OFFSET", numbers @ ..] => {
-                let numbers: Vec<f64> = numbers.iter().filter_map(|n| n.parse().ok()).collect();
+                let numbers: Result<Vec<f64>, String> = numbers.iter().take(4).map(|word| finite(word)).collect();
+                let numbers = numbers.map_err(|message| wrong(&message))?;
                 let &[x, y, z] = numbers.as_slice() else { return Err(wrong("expected three numbers after OFFSET")) };
                 match open.as_slice() {
                     [.., Some(joint)] => joints[*joint].offset = Vector3::new(x, y, z),
@@ -185,6 +201,13 @@ fn hierarchy(lines: &[&str], at: &mut usize) -> Result<(Vec<Joint>, Ends), (usiz
         *at += 1;
     }
     Err((*at, "the file ends before MOTION".into()))
+}
+
+/// Parses a number that is neither infinite, nor NaN, nor too large to compute with.
+fn finite(word: &str) -> Result<f64, String> {
+    let number = word.parse::<f64>().map_err(|_| format!("expected a number, got `{}`", excerpt(word)))?;
+    let fits = number.abs() <= LARGEST_NUMBER;
+    if fits { Ok(number) } else { Err(format!("expected a number up to {LARGEST_NUMBER:e}, got `{}`", excerpt(word))) }
 }
 
 fn channel(name: &str) -> Option<Channel> {
@@ -240,6 +263,12 @@ Frame Time: .01
             ("Frames: 2", "Frames: 3", 20),
             ("-90 0 0", "-90 0", 19),
             ("-90 0 0", "-90 0 nan", 19),
+            ("-90 0 0", "-90 0 1e308", 19),
+            ("OFFSET 0 2 0", "OFFSET 0 inf 0", 7),
+            ("OFFSET 0 2 0", "OFFSET nan nan nan", 7),
+            ("OFFSET 0 3 0", "OFFSET 0 -1e308 0", 11),
+            ("Frames: 2", "Frames: nan", 16),
+            ("Frame Time: .01", "Frame Time: inf", 17),
             ("OFFSET 0 2 0", "OFFSET 0 2", 7),
             ("CHANNELS 3 Z", "CHANNELS 3 W", 8),
             ("CHANNELS 3", "CHANNELS 2", 8),

@@ -20,6 +20,14 @@ pub enum RetargetError {
         /// Root of the body.
         bone: String,
     },
+    /// A bone is not at a finite place: lengths of motion and body differ too much.
+    #[error("frame {frame}: bone `{bone}` is not at a finite place; compare the units of motion and body")]
+    NonFinite {
+        /// Index of the frame.
+        frame: usize,
+        /// Name of the bone.
+        bone: String,
+    },
     /// The motion has no such frame.
     #[error("frame {frame} does not exist; the motion has {frames} frames")]
     NoFrame {
@@ -74,7 +82,7 @@ impl<'a> Retarget<'a> {
     /// in the first frame.
     ///
     /// # Errors
-    /// If the motion has no such frame.
+    /// If the motion has no such frame, or a bone is not at a finite place.
     pub fn motions(&self, frame: usize) -> Result<Vec<Isometry3<f64>>, RetargetError> {
         let frames = self.motion.frames();
         let pose = self.motion.pose(frame).ok_or(RetargetError::NoFrame { frame, frames })?;
@@ -93,10 +101,18 @@ impl<'a> Retarget<'a> {
                 (None, Some(parent)) => motions[parent].rotation,
                 (None, None) => UnitQuaternion::identity(),
             };
-            motions.push(Isometry3::from_parts(Translation3::from(moved_head - rotation * head), rotation));
+            let motion = Isometry3::from_parts(Translation3::from(moved_head - rotation * head), rotation);
+            if !is_finite(&motion) {
+                return Err(RetargetError::NonFinite { frame, bone: self.bones[bone].name.clone() });
+            }
+            motions.push(motion);
         }
         Ok(motions)
     }
+}
+
+fn is_finite(motion: &Isometry3<f64>) -> bool {
+    motion.translation.vector.iter().chain(motion.rotation.coords.iter()).all(|x| x.is_finite())
 }
 
 /// Returns the rotation of each bone from rest to the T pose. A limb rotates by the smallest angle to the direction of

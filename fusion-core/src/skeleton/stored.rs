@@ -1,10 +1,11 @@
 use std::path::{Path, PathBuf};
 
+use energy_files::excerpt;
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
 use serde::{Deserialize, Serialize};
 
 use super::matching::matched;
-use crate::body::Bone;
+use crate::body::{Bone, FARTHEST};
 use crate::json_file::{JsonFileError, read_json, write_json};
 
 /// A file of a skeleton that cannot be used.
@@ -88,19 +89,19 @@ impl Skeleton {
     /// If a bone is missing, or a number is not finite.
     pub fn motions(&self, frame: usize, bones: &[Bone]) -> Result<Option<Vec<Isometry3<f64>>>, SkeletonError> {
         let Some(numbers) = self.frames.get(frame).filter(|numbers| !numbers.is_empty()) else { return Ok(None) };
-        let motion =
-            |bone: &Bone| {
-                let at = self.bones.iter().position(|name| *name == bone.name).ok_or_else(|| {
-                    SkeletonError::MissingBone { bone: bone.name.clone(), known: self.bones.join(", ") }
-                })?;
-                let bad = SkeletonError::BadFrame { frame };
-                let Some(&[w, i, j, k, x, y, z]) = numbers.get(at) else { return Err(bad) };
-                let q = Quaternion::new(w, i, j, k);
-                if !((q.norm() - 1.0).abs() < 1e-3 && [x, y, z].iter().all(|t| t.is_finite())) {
-                    return Err(bad);
-                }
-                Ok(Isometry3::from_parts(Translation3::new(x, y, z), UnitQuaternion::from_quaternion(q)))
-            };
+        let motion = |bone: &Bone| {
+            let at = self.bones.iter().position(|name| *name == bone.name).ok_or_else(|| {
+                let known = excerpt(&self.bones.join(", ")).into_owned();
+                SkeletonError::MissingBone { bone: bone.name.clone(), known }
+            })?;
+            let bad = SkeletonError::BadFrame { frame };
+            let Some(&[w, i, j, k, x, y, z]) = numbers.get(at) else { return Err(bad) };
+            let q = Quaternion::new(w, i, j, k);
+            if !((q.norm() - 1.0).abs() < 1e-3 && [x, y, z].iter().all(|t| t.abs() <= FARTHEST)) {
+                return Err(bad);
+            }
+            Ok(Isometry3::from_parts(Translation3::new(x, y, z), UnitQuaternion::from_quaternion(q)))
+        };
         bones.iter().map(motion).collect::<Result<_, _>>().map(Some)
     }
 
@@ -155,8 +156,12 @@ impl Skeleton {
     /// Writes a file completely or not at all.
     ///
     /// # Errors
-    /// If the file cannot be written.
+    /// If a number is not finite, which JSON cannot represent, or the file cannot be written.
     pub fn write(&self, path: &Path) -> Result<(), SkeletonError> {
+        let is_finite = |frame: &[[f64; 7]]| frame.as_flattened().iter().all(|x| x.is_finite());
+        if let Some(frame) = self.frames.iter().position(|frame| !is_finite(frame)) {
+            return Err(SkeletonError::BadFrame { frame });
+        }
         Ok(write_json(path, self)?)
     }
 }

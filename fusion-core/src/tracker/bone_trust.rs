@@ -24,6 +24,16 @@ impl BoneTrust {
     /// Least factor: bones that the camera does not see depend on the reports.
     const LEAST: f64 = 0.1;
 
+    /// Returns the running mean of the square distance, in m².
+    pub(super) fn square(self) -> f64 {
+        self.square
+    }
+
+    /// Continues with this mean.
+    pub(super) fn restore(&mut self, square: f64) {
+        self.square = square;
+    }
+
     /// Takes the mean square distance of reported from tracked bones in a frame, in m².
     pub(super) fn update(&mut self, square: f64) {
         self.square += Self::GAIN * (square - self.square);

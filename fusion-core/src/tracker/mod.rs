@@ -4,6 +4,7 @@ mod bone_trust;
 mod options;
 mod prediction;
 mod report;
+mod state;
 
 use std::sync::Arc;
 
@@ -14,6 +15,7 @@ use self::bone_trust::BoneTrust;
 pub use self::options::TrackerOptions;
 use self::prediction::Prediction;
 pub use self::report::{FrameError, FrameQuality, FrameReport, TrackerError};
+pub use self::state::{TrackerState, TrackerStateError};
 use crate::correspondence::{Gates, MatchCounts, correspondences};
 use crate::depth::{Camera, DepthImage, NormalMap, PixelRays};
 use crate::energy::{BoneMode, BoneTargets, FusionEnergy, Moved, skeleton_energy};
@@ -96,13 +98,34 @@ impl Tracker {
     /// Returns the tracked vertices, in the camera's coordinates.
     #[must_use]
     pub fn vertices(&self) -> Vec<Vector3<f64>> {
-        self.energy.moved(&self.twists).vertices.iter().map(|vertex| vertex + self.model.origin).collect()
+        self.vertices_at(self.twists())
+    }
+
+    /// Returns the vertices that [`Self::vertices`] returned when the nodes had these twists, in the camera's
+    /// coordinates.
+    ///
+    /// # Panics
+    /// If there are fewer twists than nodes.
+    #[must_use]
+    pub fn vertices_at(&self, twists: &[Twist]) -> Vec<Vector3<f64>> {
+        let mut unknowns = self.twists.clone();
+        unknowns[..self.model.nodes.len()].copy_from_slice(&twists[..self.model.nodes.len()]);
+        self.energy.moved(&unknowns).vertices.iter().map(|vertex| vertex + self.model.origin).collect()
     }
 
     /// Returns the motion of each vertex from rest; see [`DeformationModel::vertex_motions`].
     #[must_use]
     pub fn vertex_motions(&self) -> Vec<Isometry3<f64>> {
-        self.model.vertex_motions(self.twists(), self.options.energy.angle)
+        self.vertex_motions_at(self.twists())
+    }
+
+    /// Returns the motion of each vertex from rest when the nodes have these twists.
+    ///
+    /// # Panics
+    /// If there are fewer twists than nodes.
+    #[must_use]
+    pub fn vertex_motions_at(&self, twists: &[Twist]) -> Vec<Isometry3<f64>> {
+        self.model.vertex_motions(twists, self.options.energy.angle)
     }
 
     /// Returns the tracked vertices and normals, in the model's coordinates.

@@ -1,6 +1,9 @@
 //! Motions predicted from the last frames.
 
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
+use serde::{Deserialize, Serialize};
+
+use super::state::StoredMotion;
 
 /// Predicts rigid motions at constant velocity: the velocity part of an α–β filter, whose position part is the energy's
 /// minimum.
@@ -21,6 +24,27 @@ struct Velocity {
     turn: Vector3<f64>,
 }
 
+/// What a prediction remembers of the last frames.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct PredictionState {
+    last: Vec<StoredMotion>,
+    /// Changes per frame: translation in m, then rotation vector in rad.
+    velocities: Vec<[f64; 6]>,
+}
+
+impl PredictionState {
+    /// Returns the numbers of motions and velocities.
+    pub(super) fn lengths(&self) -> [usize; 2] {
+        [self.last.len(), self.velocities.len()]
+    }
+
+    /// Returns all numbers.
+    pub(super) fn numbers(&self) -> impl Iterator<Item = f64> {
+        self.last.iter().flat_map(|motion| motion.0).chain(self.velocities.as_flattened().iter().copied())
+    }
+}
+
 impl Prediction {
     /// Gain β: the part of a velocity's error that one frame corrects.
     const GAIN: f64 = 0.5;
@@ -32,6 +56,28 @@ impl Prediction {
         let last = vec![Isometry3::identity(); centres.len()];
         let velocities = vec![Velocity::default(); centres.len()];
         Self { centres, last, velocities }
+    }
+
+    /// Returns the number of motions.
+    pub(super) fn len(&self) -> usize {
+        self.last.len()
+    }
+
+    /// Returns what the last frames have left.
+    pub(super) fn state(&self) -> PredictionState {
+        let numbers = |Velocity { shift, turn }: &Velocity| [shift.x, shift.y, shift.z, turn.x, turn.y, turn.z];
+        PredictionState {
+            last: self.last.iter().map(StoredMotion::from).collect(),
+            velocities: self.velocities.iter().map(numbers).collect(),
+        }
+    }
+
+    /// Continues from a state of the same length.
+    pub(super) fn restore(&mut self, state: &PredictionState) {
+        self.last = state.last.iter().map(|&motion| motion.into()).collect();
+        let velocity =
+            |[a, b, c, d, e, f]: [f64; 6]| Velocity { shift: Vector3::new(a, b, c), turn: Vector3::new(d, e, f) };
+        self.velocities = state.velocities.iter().map(|&numbers| velocity(numbers)).collect();
     }
 
     /// Returns the motions expected in the next frame.

@@ -1,24 +1,7 @@
-use std::io::Write;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use anyhow::Context;
-
-/// Writes a file completely or not at all: writes to a temporary file in the same folder, then renames it.
-///
-/// # Errors
-/// If the folder or the file cannot be written.
-pub fn write_whole(path: &Path, contents: &[u8]) -> std::io::Result<()> {
-    let mut temporary = path.as_os_str().to_owned();
-    temporary.push(".part");
-    let temporary = PathBuf::from(temporary);
-    let written = std::fs::File::create(&temporary)
-        .and_then(|mut file| file.write_all(contents).and_then(|()| file.sync_all()))
-        .and_then(|()| std::fs::rename(&temporary, path));
-    if written.is_err() {
-        let _ = std::fs::remove_file(&temporary);
-    }
-    written
-}
+use energy_files::write_whole;
 
 /// Writes a file as [`write_whole`] does, with an error that names the file.
 ///

@@ -1,4 +1,8 @@
-/// Formats an error and its causes on one line. A cause that the text before it already ends with is not repeated.
+/// The longest message, in characters. Names of strangers can have megabytes.
+const LONGEST: usize = 16_000;
+
+/// Formats an error and its causes, without control characters except line breaks and tabs, and with at most 16,000
+/// characters. A cause that the text before it already ends with is not repeated.
 ///
 /// ```
 /// use anyhow::Context;
@@ -16,5 +20,9 @@ pub fn message(error: &anyhow::Error) -> String {
             text = format!("{text}: {cause}");
         }
     }
-    text
+    if let Some((end, _)) = text.char_indices().nth(LONGEST) {
+        text.truncate(end);
+        text.push('…');
+    }
+    energy_files::printable(&text).into_owned()
 }

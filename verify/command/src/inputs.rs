@@ -7,6 +7,9 @@ use serde_json::Value;
 
 use verify::sample::Sample;
 
+/// The largest file of inputs, in bytes.
+const LARGEST_FILE: u64 = 256 << 20;
+
 /// Reads the inputs of a file: one object, a list of objects, or the inputs in a report. Returns each with the name of
 /// its element, if the file names it.
 ///
@@ -14,7 +17,7 @@ use verify::sample::Sample;
 /// If the file cannot be read, or contains no input.
 pub fn read_inputs(path: &Path) -> anyhow::Result<Vec<(Option<String>, Sample)>> {
     let place = || path.display();
-    let text = std::fs::read_to_string(path).with_context(|| format!("cannot read {}", place()))?;
+    let text = energy_files::read_text(path, LARGEST_FILE).with_context(|| format!("cannot read {}", place()))?;
     let value: Value = serde_json::from_str(&text).with_context(|| format!("{}", place()))?;
     let mut inputs = Vec::new();
     if let Some(lines) = value.get("lines").and_then(Value::as_array) {

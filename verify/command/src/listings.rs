@@ -3,14 +3,20 @@ use std::path::Path;
 use anyhow::Context;
 use energy_compiler::Listing;
 
+/// The largest `.energy` file, in bytes.
+const LARGEST_TEXT: u64 = 16 << 20;
+
 /// Compiles an element of the catalogue, or the declarations of an `.energy` file, for printing.
 ///
 /// # Errors
 /// If there is no such element or file, or the file has errors.
 pub fn listings(name: &str) -> anyhow::Result<Vec<Listing>> {
     if Path::new(name).extension().is_some_and(|extension| extension == "energy") {
-        let text = std::fs::read_to_string(name).with_context(|| format!("cannot read {name}"))?;
-        return Listing::from_file(&text, name).map_err(|errors| anyhow::anyhow!("{errors}"));
+        let text =
+            energy_files::read_text(Path::new(name), LARGEST_TEXT).with_context(|| format!("cannot read {name}"))?;
+        let all = Listing::from_file(&text, name).map_err(|errors| anyhow::anyhow!("{errors}"))?;
+        anyhow::ensure!(!all.is_empty(), "{name} contains no declaration; is a comment `/*` left open?");
+        return Ok(all);
     }
     let names = || energy_catalogue::catalogue().iter().map(|e| e.declaration.name).collect::<Vec<_>>().join(", ");
     let entry =

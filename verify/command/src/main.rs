@@ -7,9 +7,15 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
+const EXIT_STATUS: &str = "\
+Exit status:
+  0    every check passed
+  1    a check failed
+  2    an error: invalid arguments, a file that cannot be read, a text that does not compile";
+
 /// Audits the derivatives of declared elements, and measures their errors against multi-precision reference values.
 #[derive(Parser)]
-#[command(version)]
+#[command(version, after_help = EXIT_STATUS, after_long_help = EXIT_STATUS)]
 struct Arguments {
     #[command(subcommand)]
     command: Command,
@@ -44,11 +50,11 @@ impl Command {
 fn main() -> ExitCode {
     // A closed pipe (`| head`) ends the program without a panic.
     sigpipe::reset();
-    match Arguments::parse().command.run() {
+    match energy_cli::report_file_limits().and_then(|()| Arguments::parse().command.run()) {
         Ok(true) => ExitCode::SUCCESS,
         Ok(false) => ExitCode::FAILURE,
         Err(error) => {
-            eprintln!("error: {}", energy_cli::message(&error));
+            energy_cli::tell(&format!("error: {}", energy_cli::message(&error)));
             ExitCode::from(2)
         }
     }

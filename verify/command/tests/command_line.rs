@@ -361,3 +361,32 @@ fn declarations_of_a_file_are_shown_and_their_errors_placed() {
         "{message}"
     );
 }
+
+#[cfg(target_os = "linux")]
+#[test]
+fn output_that_cannot_be_printed_is_an_error() {
+    for arguments in [&["show", "Spring"][..], &["audit", "Spring", "--samples", "2"]] {
+        let full = std::fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
+        let output = Command::new(env!("CARGO_BIN_EXE_verify")).args(arguments).stdout(full).output().unwrap();
+        let message = text(&output.stderr);
+        assert!(output.status.code() == Some(2) && message.starts_with("error: cannot print: No space"), "{message}");
+    }
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn files_without_declarations_and_files_without_end_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("open.energy");
+    std::fs::write(&file, "/* energy Mine(p: Point) = \"p·p\";").unwrap();
+    let pipe = folder.path().join("pipe.energy");
+    assert!(Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+    for (path, reason) in [(&file, ""), (&pipe, "expected a regular file, got a pipe")] {
+        let path = path.to_str().unwrap();
+        for arguments in [&["show", path][..], &["audit", "--file", path], &["audit", "Spring", "--at", path]] {
+            let output = verify(arguments);
+            let message = text(&output.stderr);
+            assert!(output.status.code() == Some(2) && message.contains(reason), "{arguments:?}: {message}");
+        }
+    }
+}

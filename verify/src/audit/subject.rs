@@ -25,6 +25,9 @@ enum Origin {
     Text(Box<Interpreted>),
 }
 
+/// The largest `.energy` file, in bytes.
+const LARGEST_TEXT: u64 = 16 << 20;
+
 impl Target {
     /// Creates the target of an element of the catalogue.
     #[must_use]
@@ -46,7 +49,8 @@ impl Target {
     /// # Errors
     /// If the file cannot be read, or the text has errors.
     pub fn of_file(path: &Path) -> anyhow::Result<Vec<Self>> {
-        let text = std::fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
+        let text =
+            energy_files::read_text(path, LARGEST_TEXT).with_context(|| format!("cannot read {}", path.display()))?;
         let targets =
             Self::of_text(&text, &path.display().to_string()).map_err(|errors| anyhow::anyhow!("{errors}"))?;
         anyhow::ensure!(!targets.is_empty(), "{} contains no declaration", path.display());

@@ -13,7 +13,6 @@ use serde::Deserialize;
 use super::Bending;
 use crate::bounded::{RealMap, Signed};
 use crate::geometry::{norm, subtract};
-use crate::input_text;
 use crate::mesh::{MaterialTriangle, Topology, TriangleMesh, lumped_masses, rest_angle};
 
 /// The largest size of an `.energy` file, in bytes.
@@ -138,8 +137,7 @@ impl Declared {
 
     fn read(&self) -> Result<Vec<Interpreted>, DeclaredError> {
         let path = || self.path.clone();
-        let text = input_text::read_regular(&self.path, LARGEST_FILE)
-            .and_then(input_text::utf8)
+        let text = energy_files::read_text(&self.path, LARGEST_FILE)
             .map_err(|source| DeclaredError::Unreadable { path: path(), source })?;
         let all = Interpreted::from_file(&text, &self.path.display().to_string())
             .map_err(|errors| DeclaredError::Text { diagnostics: errors.to_string() })?;

@@ -3,6 +3,9 @@ use energy_dsl::Vector3;
 use super::patterns::Patterns;
 use crate::geometry::{Pose, cross, norm, subtract};
 
+/// The largest number of triangles that a message lists.
+const SHOWN: usize = 5;
+
 /// Why vertices and triangles do not form a valid mesh. Indices start from 0.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[expect(missing_docs, reason = "the messages name the fields")]
@@ -21,8 +24,9 @@ pub enum MeshError {
     ZeroArea { triangle: usize, corners: [usize; 3] },
     /// An edge belongs to more than two triangles.
     #[error(
-        "edge {}–{} is shared by {} triangles {triangles:?}; a surface has at most two along an edge",
-        .edge[0], .edge[1], .triangles.len()
+        "edge {}–{} is shared by {} triangles {:?}{}; a surface has at most two along an edge",
+        .edge[0], .edge[1], .triangles.len(), &.triangles[..SHOWN.min(.triangles.len())],
+        if .triangles.len() > SHOWN { " and more" } else { "" }
     )]
     NonManifoldEdge { edge: [usize; 2], triangles: Vec<usize> },
     /// A vertex belongs to no triangle, so it would have no mass.

@@ -1,7 +1,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::lock::FolderLock;
+use energy_files::{FolderLock, LockError, PartFile, remove_parts, subfolder};
 
 /// A folder or file that cannot be written.
 #[derive(Debug, thiserror::Error)]
@@ -17,15 +17,28 @@ pub enum OutputError {
         path: PathBuf,
     },
     /// Another run writes to the folder.
-    #[error("{} is in use by process {process}; wait until it ends, or choose another folder with -o", .path.display())]
-    InUse {
-        path: PathBuf,
-        /// The process identifier of the other run.
-        process: String,
-    },
+    #[error(transparent)]
+    InUse(LockError),
     /// A file cannot be written.
     #[error("cannot write {}", .path.display())]
     File { path: PathBuf, source: std::io::Error },
+}
+
+impl From<LockError> for OutputError {
+    fn from(error: LockError) -> Self {
+        match error {
+            LockError::File { path, source } => Self::File { path, source },
+            in_use @ LockError::InUse { .. } => Self::InUse(in_use),
+        }
+    }
+}
+
+/// File name of the lock.
+const LOCK: &str = "cloth.lock";
+
+/// Whether a path names anything, such as a symbolic link to nothing.
+fn is_there(path: &Path) -> bool {
+    path.symlink_metadata().is_ok()
 }
 
 /// The output folder of a run: `cloth.png`, `cloth.glb`, `cloth.usda`, `ledger.csv`, `ledger.svg`, `contact.svg`,
@@ -61,6 +74,8 @@ impl OutputFolder {
     pub const REPORT: &'static str = "report.html";
     /// File name of the checkpoint.
     pub const CHECKPOINT: &'static str = "checkpoint";
+    /// File name of the checkpoint before the last one.
+    pub const PREVIOUS_CHECKPOINT: &'static str = "checkpoint.previous";
     /// File name of the frames saved with the checkpoint.
     pub const SAVED_FRAMES: &'static str = "checkpoint.frames";
     /// File name of the summary.
@@ -71,7 +86,7 @@ impl OutputFolder {
     pub const FRAMES: &'static str = "frames";
 
     /// All files of a run except the frames.
-    const RESULTS: [&'static str; 13] = [
+    const RESULTS: [&'static str; 14] = [
         Self::PICTURE,
         Self::ANIMATION,
         Self::SUMMARY,
@@ -84,6 +99,7 @@ impl OutputFolder {
         Self::RECORD,
         Self::REPORT,
         Self::CHECKPOINT,
+        Self::PREVIOUS_CHECKPOINT,
         Self::SAVED_FRAMES,
     ];
 
@@ -96,7 +112,7 @@ impl OutputFolder {
     pub fn open(path: &Path, overwrite: bool) -> Result<Self, OutputError> {
         let folder = Self::reopen(path)?;
         let unusable = |source| OutputError::Folder { path: path.to_owned(), source };
-        let results = Self::RESULTS.map(|name| path.join(name)).into_iter().filter(|path| path.exists());
+        let results = Self::RESULTS.map(|name| path.join(name)).into_iter().filter(|path| is_there(path));
         let frames = folder.existing_frames().map_err(unusable)?;
         let caches = folder.existing_caches().map_err(unusable)?;
         let old: Vec<PathBuf> = results.chain(frames).chain(caches).collect();
@@ -115,7 +131,14 @@ impl OutputFolder {
     /// Returns an error if the folder cannot be written to, or if another run writes to it.
     pub fn reopen(path: &Path) -> Result<Self, OutputError> {
         let folder = Self::unlocked(path)?;
-        Ok(Self { lock: FolderLock::take(path)?.map(Arc::new), ..folder })
+        let folder = Self { lock: FolderLock::take(path, LOCK)?.map(Arc::new), ..folder };
+        // A killed run may have left unfinished files.
+        let folders = [path.to_owned(), folder.frames()];
+        folders.iter().try_for_each(|path| remove_parts(path)).map_err(|source| {
+            let path = path.to_owned();
+            OutputError::Folder { path, source }
+        })?;
+        Ok(folder)
     }
 
     /// Opens the folder of a run that is reported, and checks that it can be written to. Does not lock it: the report
@@ -126,10 +149,10 @@ impl OutputFolder {
     pub fn unlocked(path: &Path) -> Result<Self, OutputError> {
         let folder = Self { path: path.to_owned(), lock: None };
         let unusable = |source| OutputError::Folder { path: path.to_owned(), source };
-        std::fs::create_dir_all(folder.frames()).map_err(unusable)?;
-        for probed in [path.to_owned(), folder.frames()] {
-            let probe = probed.join(".cloth-write-probe");
-            std::fs::write(&probe, []).and_then(|()| std::fs::remove_file(&probe)).map_err(unusable)?;
+        std::fs::create_dir_all(path).map_err(unusable)?;
+        let frames = subfolder(path, Self::FRAMES).map_err(unusable)?;
+        for probed in [path.to_owned(), frames] {
+            PartFile::create(&probed.join("probe")).map_err(unusable)?;
         }
         Ok(folder)
     }
@@ -140,13 +163,32 @@ impl OutputFolder {
         &self.path
     }
 
+    /// Writes a checkpoint, and keeps the one before it.
+    ///
+    /// # Errors
+    /// Returns an error if a file cannot be written.
+    pub fn write_checkpoint(&self, contents: &[u8]) -> Result<(), OutputError> {
+        let path = self.path.join(Self::CHECKPOINT);
+        energy_files::sealed::write_generation(&path, contents).map_err(|source| OutputError::File { path, source })
+    }
+
+    /// Puts the checkpoint before the last one in the place of the last one, which is damaged.
+    ///
+    /// # Errors
+    /// Returns an error if the file cannot be renamed.
+    pub fn restore_checkpoint(&self) -> Result<(), OutputError> {
+        let path = self.path.join(Self::CHECKPOINT);
+        energy_files::sealed::restore_generation(&path).map_err(|source| OutputError::File { path, source })
+    }
+
     /// Writes a file atomically and returns its path.
     ///
     /// # Errors
     /// Returns an error if the file cannot be written.
     pub fn write(&self, name: &str, contents: &[u8]) -> Result<PathBuf, OutputError> {
         let path = self.path.join(name);
-        energy_cli::write_whole(&path, contents).map_err(|source| OutputError::File { path: path.clone(), source })?;
+        energy_files::write_whole(&path, contents)
+            .map_err(|source| OutputError::File { path: path.clone(), source })?;
         Ok(path)
     }
 
@@ -163,16 +205,17 @@ impl OutputFolder {
     /// # Errors
     /// Returns an error if the file cannot be written.
     pub fn write_cache(&self, name: &str, contents: &[u8]) -> Result<PathBuf, OutputError> {
-        let path = self.path.join(Self::CACHES);
-        std::fs::create_dir_all(&path).map_err(|source| OutputError::Folder { path, source })?;
+        let unusable = |source| OutputError::Folder { path: self.path.join(Self::CACHES), source };
+        subfolder(&self.path, Self::CACHES).map_err(unusable)?;
         self.write(&format!("{}/{name}", Self::CACHES), contents)
     }
 
     fn existing_caches(&self) -> std::io::Result<Vec<PathBuf>> {
         let folder = self.path.join(Self::CACHES);
-        if !folder.exists() {
+        if !is_there(&folder) {
             return Ok(Vec::new());
         }
+        subfolder(&self.path, Self::CACHES)?;
         let entries = std::fs::read_dir(folder)?.map(|entry| Ok(entry?.path()));
         let is_cache =
             |path: &PathBuf| path.extension().is_some_and(|extension| extension == "pc2" || extension == "mdd");

@@ -4,7 +4,6 @@ mod animation;
 mod floor_shadow;
 mod folder;
 mod frame;
-mod lock;
 mod picture;
 mod ply;
 mod point_cache;

@@ -94,12 +94,11 @@ impl Tests {
     /// Creates the masks where inputs are far from overflow.
     pub(super) fn guards(&self, g: &mut Graph) -> Vec<NodeId> {
         let mut guards = Vec::new();
-        let of_inputs: [(_, fn(Range) -> u32); 2] =
-            [(&self.parameters, |range| range.parameter), (&self.lengths, |range| range.length)];
-        for (inputs, exponent) in of_inputs {
+        let (parameters, lengths) = ([DOUBLE.parameter, SINGLE.parameter], [DOUBLE.length, SINGLE.length]);
+        for (inputs, exponents) in [(&self.parameters, parameters), (&self.lengths, lengths)] {
             if !inputs.is_empty() {
                 let square = g.sum_of_squares(&inputs.iter().copied().collect::<Vec<_>>());
-                let [double, single] = [DOUBLE, SINGLE].map(|range| 4.0_f64.powi(exponent(range) as i32));
+                let [double, single] = exponents.map(|exponent| 4.0_f64.powi(exponent as i32));
                 let largest = g.by_precision(double, single);
                 guards.push(g.less(square, largest));
             }

@@ -222,6 +222,8 @@ fn rows_of(series: &[(Series, Outcomes)], first: Order, end: Order) -> Option<Ro
 
 /// A number along the rays of a bundle.
 #[derive(Clone, Debug)]
+// Nearly all numbers are sums of rows.
+#[allow(clippy::large_enum_variant)]
 pub(super) enum Bundle {
     /// It does not depend on the ray.
     Same(Series),

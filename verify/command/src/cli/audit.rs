@@ -2,6 +2,7 @@ use std::num::NonZero;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use energy_cli::print;
 use serde::Serialize;
 use verify::audit::{Options, Report, Target, audit_all, audit_at, describe_failure};
 
@@ -74,7 +75,7 @@ impl Audit {
             Some(at) => audit_at_inputs(&targets, energy.as_ref(), &at)?,
             None => audit_all(&targets, energy.as_ref(), options),
         };
-        print(&report);
+        show(&report)?;
         write_json(self.json.as_deref(), &Written { report: &report, not_looked_at: report.blind_spots() })?;
         write_text(self.html.as_deref(), || verify_command::audit_page(&report))?;
         write_text(self.junit.as_deref(), || verify::audit::junit(&report))?;
@@ -104,7 +105,7 @@ fn audit_at_inputs(targets: &[Target], energy: Option<&Target>, file: &Path) -> 
     Ok(report)
 }
 
-fn print(report: &Report) {
+fn show(report: &Report) -> anyhow::Result<()> {
     let mut table = table(&["element", "block", "check", "worst error", "allowed", "order", "verdict"], &[3, 4, 5]);
     for line in &report.lines {
         table.add_row([
@@ -117,42 +118,42 @@ fn print(report: &Report) {
             if line.passed { "ok" } else { "FAILED" }.to_owned(),
         ]);
     }
-    println!("{table}");
+    print(&format!("{table}\n"))?;
     for line in report.failures() {
-        println!("\n{}", describe_failure(line));
+        print(&format!("\n{}\n", describe_failure(line)))?;
     }
     for (name, why) in &report.refused {
-        println!("\n{name} cannot be audited: {why}");
+        print(&format!("\n{name} cannot be audited: {why}\n"))?;
     }
     for (element, warning) in report.warnings() {
-        println!("\nwarning: {}", warning.describe(element));
+        print(&format!("\nwarning: {}\n", warning.describe(element)))?;
     }
     for (element, mutant) in report.missed() {
-        println!("\n{element}: no check noticed a planted fault: {}", mutant.fault);
+        print(&format!("\n{element}: no check noticed a planted fault: {}\n", mutant.fault))?;
     }
-    print_mutation_scores(report);
-    println!("\n{}", report.blind_spots().join("\n"));
-    println!(
-        "\n{} elements, {} checks, {} failed, {} warnings",
+    print_mutation_scores(report)?;
+    print(&format!("\n{}\n", report.blind_spots().join("\n")))?;
+    print(&format!(
+        "\n{} elements, {} checks, {} failed, {} warnings\n",
         report.elements(),
         report.lines.len(),
         report.failures().count() + report.refused.len() + report.missed().count(),
         report.warnings().count()
-    );
+    ))
 }
 
-fn print_mutation_scores(report: &Report) {
+fn print_mutation_scores(report: &Report) -> anyhow::Result<()> {
     let scores: Vec<_> = report.sections.iter().filter_map(|section| section.mutations.as_ref()).collect();
     if scores.is_empty() {
-        return;
+        return Ok(());
     }
-    println!(
+    print(&format!(
         "\n{} of {} planted faults noticed; of others drawn, {} provably change nothing, \
-         {} change last bits only, {} change nothing at any input tried",
+         {} change last bits only, {} change nothing at any input tried\n",
         scores.iter().map(|score| score.caught()).sum::<usize>(),
         scores.iter().map(|score| score.mutants.len()).sum::<usize>(),
         scores.iter().map(|score| score.equivalent).sum::<usize>(),
         scores.iter().map(|score| score.within_rounding).sum::<usize>(),
         scores.iter().map(|score| score.without_effect).sum::<usize>()
-    );
+    ))
 }

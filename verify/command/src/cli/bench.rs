@@ -1,6 +1,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use energy_cli::print;
 use verify_command::bench::{bench, bench_interpreted, csv, markdown, plots};
 
 use super::output::{create_folder, write_text};
@@ -28,7 +29,7 @@ impl Bench {
         };
         let list = list.map_err(anyhow::Error::msg)?;
         let table = markdown(&list);
-        print!("{table}");
+        print(&table)?;
         if let Some(folder) = self.output {
             create_folder(&folder)?;
             write_text(Some(&folder.join("bench.md")), || table)?;

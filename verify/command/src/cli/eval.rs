@@ -1,6 +1,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use energy_cli::print;
 use verify_command::reference::{Source, evaluate_file, evaluate_inputs};
 
 use super::targets::targets;
@@ -29,7 +30,7 @@ impl Eval {
             None => evaluate_file(&self.records, &self.output, source)?,
             Some(file) => evaluate_inputs(&targets(&[], Some(&file))?, &self.records, &self.output, source)?,
         };
-        println!("{count} records evaluated, written to {}", self.output.display());
+        print(&format!("{count} records evaluated, written to {}\n", self.output.display()))?;
         Ok(true)
     }
 }

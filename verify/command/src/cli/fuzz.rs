@@ -3,6 +3,7 @@ use std::time::Duration;
 
 use anyhow::Context;
 use clap::Args;
+use energy_cli::print;
 use verify::fuzz::{Budget, Finding, Summary, fuzz};
 use verify_command::fuzz_targets::Target;
 
@@ -30,13 +31,13 @@ impl Fuzz {
         let corpus = corpus.unwrap_or_else(|| target.corpus());
         match fuzz(&corpus, target.words(), Budget::Time(time), seed, |text| target.run(text)) {
             Ok(Summary { corpus, edited, outcomes }) => {
-                println!(
-                    "{corpus} inputs and {edited} edited ones: {outcomes} different outcomes, no panic, none slow"
-                );
+                print(&format!(
+                    "{corpus} inputs and {edited} edited ones: {outcomes} different outcomes, no panic, none slow\n"
+                ))?;
                 Ok(true)
             }
             Err(error) => {
-                println!("{}", error.downcast::<Finding>()?);
+                print(&format!("{}\n", error.downcast::<Finding>()?))?;
                 Ok(false)
             }
         }

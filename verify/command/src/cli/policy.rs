@@ -1,5 +1,6 @@
 //! Results at degenerate inputs, which two commands print.
 
+use energy_cli::print;
 use verify_command::reference::PolicyLine;
 
 use super::output::table;
@@ -10,9 +11,9 @@ pub fn passed(lines: &[PolicyLine]) -> bool {
 }
 
 /// Prints the results, if there are any.
-pub fn print(lines: &[PolicyLine]) {
+pub fn show(lines: &[PolicyLine]) -> anyhow::Result<()> {
     if lines.is_empty() {
-        return;
+        return Ok(());
     }
     let mut table = table(&["degenerate input", "potential", "block", "status", "returned", "verdict"], &[]);
     for line in lines {
@@ -25,5 +26,5 @@ pub fn print(lines: &[PolicyLine]) {
     }
     let judged = lines.iter().filter(|line| line.passed.is_some()).count();
     let passed = lines.iter().filter(|line| line.passed == Some(true)).count();
-    println!("\n{table}\n\n{passed} of {judged} blocks at degenerate inputs as documented");
+    print(&format!("\n{table}\n\n{passed} of {judged} blocks at degenerate inputs as documented\n"))
 }

@@ -1,6 +1,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use energy_cli::print;
 use verify_command::reference::{BlockLine, FamilyLine, ReferenceReport, fusion_reference, reference};
 
 use super::output::{data, records, table, write_json};
@@ -25,14 +26,14 @@ impl Reference {
         // Records of tracking have a format of their own.
         let tracking = self.folder.clone().unwrap_or_else(|| data().join("fusion")).join("reference.json");
         let tracked = if tracking.exists() { fusion_reference(&tracking)? } else { Vec::new() };
-        print_families(&tracked);
+        print_families(&tracked)?;
         let exceeded = tracked.iter().any(|line| !line.passed());
         if self.folder.is_some() && !tracked.is_empty() {
             write_json(self.json.as_deref(), &tracked)?;
             return Ok(!exceeded);
         }
         let report = reference(&self.folder.unwrap_or_else(records))?;
-        print(&report);
+        show(&report)?;
         write_json(self.json.as_deref(), &report)?;
         let nan = report.lines.iter().any(|line| line.nan > 0);
         let beyond = report.lines.iter().any(|l| !l.beyond_tier_a.is_empty() || !l.beyond_tier_b.is_empty());
@@ -41,7 +42,7 @@ impl Reference {
     }
 }
 
-fn print(report: &ReferenceReport) {
+fn show(report: &ReferenceReport) -> anyhow::Result<()> {
     let headings =
         ["potential", "block", "records", "NaN", "worst, u", "worst, u·κ", "worst, u, exact edges", "tier A", "tier B"];
     let mut errors = table(&headings, &[2, 3, 4, 5, 6]);
@@ -58,22 +59,22 @@ fn print(report: &ReferenceReport) {
             line.tier_b.map_or_else(String::new, |bound| verdict(&line.beyond_tier_b, &format!("{bound} u"))),
         ]);
     }
-    println!("{errors}");
+    print(&format!("{errors}\n"))?;
     let beyond = |pick: fn(&BlockLine) -> &Vec<String>| {
         report.lines.iter().flat_map(|l| pick(l).iter().map(|id| format!("{id} ({})", l.block))).collect::<Vec<_>>()
     };
     let (a, b) = (beyond(|l| &l.beyond_tier_a), beyond(|l| &l.beyond_tier_b));
-    println!("\nbeyond tier A: {}", if a.is_empty() { "none".into() } else { a.join(", ") });
-    println!("beyond tier B: {}", if b.is_empty() { "none".into() } else { b.join(", ") });
+    print(&format!("\nbeyond tier A: {}\n", if a.is_empty() { "none".into() } else { a.join(", ") }))?;
+    print(&format!("beyond tier B: {}\n", if b.is_empty() { "none".into() } else { b.join(", ") }))?;
     if !report.undeclared.is_empty() {
-        println!("potentials without a declared element: {}", report.undeclared.join(", "));
+        print(&format!("potentials without a declared element: {}\n", report.undeclared.join(", ")))?;
     }
-    policy::print(&report.policy);
+    policy::show(&report.policy)
 }
 
-fn print_families(lines: &[FamilyLine]) {
+fn print_families(lines: &[FamilyLine]) -> anyhow::Result<()> {
     if lines.is_empty() {
-        return;
+        return Ok(());
     }
     let mut table = table(&["tracking", "array", "cases", "worst error", "allowed", "verdict"], &[2, 3, 4]);
     for line in lines {
@@ -86,7 +87,7 @@ fn print_families(lines: &[FamilyLine]) {
             if line.passed() { "ok".to_owned() } else { format!("FAILED ({})", line.worst_case) },
         ]);
     }
-    println!("{table}\n");
+    print(&format!("{table}\n\n"))
 }
 
 fn verdict(beyond: &[String], bound: &str) -> String {

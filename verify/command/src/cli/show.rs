@@ -1,5 +1,6 @@
 use anyhow::Context;
 use clap::Args;
+use energy_cli::print;
 
 /// Prints the code generated for an element.
 #[derive(Args)]
@@ -21,15 +22,15 @@ impl Show {
     pub fn run(self) -> anyhow::Result<bool> {
         for listing in verify_command::listings(&self.name)? {
             match &self.routine {
-                _ if self.plan => print!("{}", listing.plans()),
-                _ if self.counts => print!("{}", listing.counts()),
-                None => print!("{}", listing.code()),
+                _ if self.plan => print(&listing.plans())?,
+                _ if self.counts => print(&listing.counts())?,
+                None => print(&listing.code())?,
                 Some(routine) => {
                     let code = listing.routine(routine).with_context(|| {
                         let known = listing.routines().join(", ");
                         format!("{} has no routine `{routine}`; it has {known}", listing.name())
                     })?;
-                    print!("{code}");
+                    print(&code)?;
                 }
             }
         }

@@ -2,6 +2,7 @@ use std::num::NonZero;
 use std::path::PathBuf;
 
 use clap::Args;
+use energy_cli::print;
 use verify_command::reference::policy;
 use verify_command::stress::{markdown, plots, stress};
 
@@ -32,7 +33,7 @@ impl Stress {
         let targets = targets(&self.names, self.file.as_deref())?;
         let tracks = stress(&targets, self.threads).map_err(anyhow::Error::msg)?;
         let table = markdown(&tracks);
-        print!("{table}");
+        print(&table)?;
         if let Some(folder) = self.output {
             create_folder(&folder)?;
             write_text(Some(&folder.join("stress.md")), || table)?;
@@ -42,9 +43,9 @@ impl Stress {
             }
         }
         let degenerate = if self.file.is_some() { Vec::new() } else { policy(&records().join("policy.json"))? };
-        documented::print(&degenerate);
+        documented::show(&degenerate)?;
         let failed = tracks.iter().filter(|track| !track.passed()).count();
-        println!("\n{} blocks along sweeps, {failed} failed", tracks.len());
+        print(&format!("\n{} blocks along sweeps, {failed} failed\n", tracks.len()))?;
         Ok(failed == 0 && documented::passed(&degenerate))
     }
 }

@@ -51,9 +51,12 @@ impl RecordError {
     }
 }
 
+/// The largest file of records, in bytes.
+const LARGEST_FILE: u64 = 1 << 30;
+
 /// Reads a JSON file.
 pub(super) fn read<T: for<'de> Deserialize<'de>>(path: &Path) -> Result<T, RecordError> {
-    let text = std::fs::read_to_string(path).map_err(|e| RecordError::file(path, e))?;
+    let text = energy_files::read_text(path, LARGEST_FILE).map_err(|e| RecordError::file(path, e))?;
     serde_json::from_str(&text).map_err(|error| RecordError::Syntax {
         path: path.display().to_string(),
         line: error.line(),

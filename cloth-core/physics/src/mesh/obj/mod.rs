@@ -1,7 +1,5 @@
 //! Reads OBJ files as exporters write them.
 
-mod file;
-mod lines;
 mod weld;
 
 use std::collections::BTreeMap;
@@ -9,34 +7,22 @@ use std::path::{Path, PathBuf};
 
 use energy_dsl::Vector3;
 
-use super::{CornerAttributes, MeshError, TriangleMesh};
-use crate::input_text;
-use file::{Corner, Face, Malformed, ObjFile};
+use energy_files::excerpt;
+use mesh_obj::{Corner, Face, ObjFile, ObjFileError};
 
-/// The largest size of an OBJ file, in bytes: some ten million vertices.
-const LARGEST_FILE: u64 = 1 << 30;
+use super::{CornerAttributes, MeshError, TriangleMesh};
 
 /// An OBJ file that is not a valid mesh.
 #[derive(Debug, thiserror::Error)]
 #[expect(missing_docs, reason = "the messages name the fields")]
 pub enum ObjError {
-    /// The file cannot be read.
-    #[error("cannot read {}", .path.display())]
-    Unreadable { path: PathBuf, source: std::io::Error },
-    /// A line is malformed.
-    #[error("{}:{line}: {reason}: `{text}`", .path.display())]
-    Line {
-        path: PathBuf,
-        /// The line, from 1.
-        line: usize,
-        reason: String,
-        /// The text of the line.
-        text: String,
-    },
+    /// The file cannot be read, or a line is malformed.
+    #[error(transparent)]
+    File(#[from] ObjFileError),
     /// The file has no such group.
     #[error(
         "{}: there is no group, object or material called `{name}`; there are {}",
-        .path.display(), .known.join(", ")
+        .path.display(), excerpt(&.known.join(", "))
     )]
     UnknownGroup {
         path: PathBuf,
@@ -96,30 +82,25 @@ pub fn read_obj(path: &Path) -> Result<TriangleMesh, ObjError> {
 /// Returns an error if the file cannot be read, a line is malformed, a group does not exist, or the mesh is invalid,
 /// with the line number if one line is at fault.
 pub fn read_obj_surface(path: &Path, options: ObjOptions<'_>) -> Result<ObjSurface, ObjError> {
-    let contents = input_text::read_regular(path, LARGEST_FILE);
-    let contents = contents.map_err(|source| ObjError::Unreadable { path: path.to_owned(), source })?;
-    surface(&lines::decoded(contents), path, options)
+    surface(&ObjFile::read(path)?, path, options)
 }
 
-fn surface(text: &str, path: &Path, options: ObjOptions<'_>) -> Result<ObjSurface, ObjError> {
-    let file = ObjFile::parse(&lines::logical(text)).map_err(|Malformed { line, reason, text }| {
-        let path = path.to_owned();
-        ObjError::Line { path, line, reason, text }
-    })?;
-    let faces = chosen_faces(&file, path, options.groups)?;
-    Triangulation::new(&file, &faces, options.weld).surface(&file, path)
+fn surface(file: &ObjFile, path: &Path, options: ObjOptions<'_>) -> Result<ObjSurface, ObjError> {
+    let faces = chosen_faces(file, path, options.groups)?;
+    Triangulation::new(file, &faces, options.weld).surface(file, path)
 }
 
 /// Returns the faces of the groups.
-fn chosen_faces<'a>(file: &'a ObjFile, path: &Path, groups: Option<&[String]>) -> Result<Vec<&'a Face>, ObjError> {
-    let Some(groups) = groups else { return Ok(file.faces.iter().collect()) };
+fn chosen_faces(file: &ObjFile, path: &Path, groups: Option<&[String]>) -> Result<Vec<Face>, ObjError> {
+    let Some(groups) = groups else { return Ok(file.faces.clone()) };
     let number = |name: &String| {
         let unknown =
             || ObjError::UnknownGroup { path: path.to_owned(), name: name.clone(), known: file.names.clone() };
         file.names.iter().position(|known| known == name).ok_or_else(unknown)
     };
     let wanted: Vec<usize> = groups.iter().map(number).collect::<Result<_, _>>()?;
-    Ok(file.faces.iter().filter(|face| face.groups.iter().any(|group| wanted.contains(group))).collect())
+    let is_wanted = |face: &Face| file.groups(*face).iter().any(|group| wanted.contains(group));
+    Ok(file.faces.iter().copied().filter(is_wanted).collect())
 }
 
 /// The triangles of faces, with vertices numbered from 0 without unused ones.
@@ -127,10 +108,9 @@ struct Triangulation {
     /// The vertex of the file for each vertex.
     sources: Vec<usize>,
     triangles: Vec<[usize; 3]>,
-    /// The corners of each triangle in the file, its line, and the groups of its face.
+    /// The corners of each triangle in the file, and its face.
     corners: Vec<[Corner; 3]>,
-    lines: Vec<usize>,
-    groups: Vec<Vec<usize>>,
+    faces: Vec<Face>,
     /// The index of each triangle before welding.
     kept: Vec<usize>,
     unwelded: usize,
@@ -138,9 +118,9 @@ struct Triangulation {
 }
 
 impl Triangulation {
-    fn new(file: &ObjFile, faces: &[&Face], weld: Option<f64>) -> Self {
+    fn new(file: &ObjFile, faces: &[Face], weld: Option<f64>) -> Self {
         let mut used = vec![false; file.vertices.len()];
-        faces.iter().flat_map(|face| &face.corners).for_each(|corner| used[corner.vertex] = true);
+        faces.iter().flat_map(|face| file.corners(*face)).for_each(|corner| used[corner.vertex()] = true);
         let used: Vec<usize> = (0..used.len()).filter(|&vertex| used[vertex]).collect();
         // The vertex of the file that stands for each.
         let mut merged: Vec<usize> = (0..file.vertices.len()).collect();
@@ -153,20 +133,21 @@ impl Triangulation {
         let mut number = vec![usize::MAX; file.vertices.len()];
         sources.iter().enumerate().for_each(|(place, &vertex)| number[vertex] = place);
         let welded = used.len() - sources.len();
-        let (triangles, corners, lines, groups) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
-        let (kept, unwelded) = (Vec::new(), 0);
-        let mut all = Self { sources, triangles, corners, lines, groups, kept, unwelded, welded };
+        let count = faces.iter().map(|face| file.corners(*face).len() - 2).sum();
+        let (triangles, corners) = (Vec::with_capacity(count), Vec::with_capacity(count));
+        let (owners, kept, unwelded) = (Vec::with_capacity(count), Vec::with_capacity(count), 0);
+        let mut all = Self { sources, triangles, corners, faces: owners, kept, unwelded, welded };
         for face in faces {
-            for end in 2..face.corners.len() {
-                let corners = [face.corners[0], face.corners[end - 1], face.corners[end]];
-                let triangle = corners.map(|corner| number[merged[corner.vertex]]);
+            let polygon = file.corners(*face);
+            for end in 2..polygon.len() {
+                let corners = [polygon[0], polygon[end - 1], polygon[end]];
+                let triangle = corners.map(|corner| number[merged[corner.vertex()]]);
                 let [a, b, c] = triangle;
                 // Welding closes triangles that are smaller than its distance.
                 if weld.is_none() || a != b && b != c && c != a {
                     all.triangles.push(triangle);
                     all.corners.push(corners);
-                    all.lines.push(face.line);
-                    all.groups.push(face.groups.clone());
+                    all.faces.push(*face);
                     all.kept.push(all.unwelded);
                 }
                 all.unwelded += 1;
@@ -180,8 +161,8 @@ impl Triangulation {
         let corners = self.attributes(file);
         let mut groups: BTreeMap<String, Vec<usize>> = BTreeMap::new();
         let mut group_triangles: BTreeMap<String, Vec<usize>> = BTreeMap::new();
-        for (number, (triangle, names)) in self.triangles.iter().zip(&self.groups).enumerate() {
-            for name in names.iter().map(|&name| &file.names[name]) {
+        for (number, (triangle, face)) in self.triangles.iter().zip(&self.faces).enumerate() {
+            for name in file.groups(*face).iter().map(|&name| &file.names[name]) {
                 groups.entry(name.clone()).or_default().extend(triangle);
                 group_triangles.entry(name.clone()).or_default().push(number);
             }
@@ -200,27 +181,27 @@ impl Triangulation {
 
     /// Texture coordinates and normals, each only if all corners have them.
     fn attributes(&self, file: &ObjFile) -> CornerAttributes {
-        let of = |pick: fn(&Corner) -> Option<usize>| -> Option<Vec<[usize; 3]>> {
+        let of = |pick: fn(Corner) -> Option<usize>| -> Option<Vec<[usize; 3]>> {
             let triangle = |corners: &[Corner; 3]| -> Option<[usize; 3]> {
-                let [a, b, c] = corners.each_ref().map(pick);
+                let [a, b, c] = corners.map(pick);
                 Some([a?, b?, c?])
             };
             self.corners.iter().map(triangle).collect()
         };
-        let uvs = of(|corner| corner.uv);
+        let uvs = of(Corner::uv);
         let uvs = uvs.map(|uvs| uvs.into_iter().map(|corners| corners.map(|corner| file.uvs[corner])).collect());
-        CornerAttributes { uvs, normals: of(|corner| corner.normal) }
+        CornerAttributes { uvs, normals: of(Corner::normal) }
     }
 
     fn unfit(&self, file: &ObjFile, path: &Path, source: MeshError) -> ObjError {
         let line = match &source {
             MeshError::NonFiniteVertex { vertex, .. } | MeshError::Unreferenced { vertex, .. } => {
-                self.sources.get(*vertex).map(|&vertex| file.vertex_lines[vertex])
+                self.sources.get(*vertex).map(|&vertex| file.vertex_lines[vertex] as usize)
             }
             MeshError::VertexOutOfRange { triangle, .. } | MeshError::ZeroArea { triangle, .. } => {
-                Some(self.lines[*triangle])
+                Some(self.faces[*triangle].line())
             }
-            MeshError::NonManifoldEdge { triangles, .. } => triangles.last().map(|&last| self.lines[last]),
+            MeshError::NonManifoldEdge { triangles, .. } => triangles.last().map(|&last| self.faces[last].line()),
             MeshError::Empty { .. } => None,
         };
         ObjError::Unfit { path: path.to_owned(), line, source }
@@ -232,7 +213,9 @@ mod tests {
     use super::*;
 
     fn read_with(text: &str, options: ObjOptions<'_>) -> Result<ObjSurface, String> {
-        surface(text, Path::new("sheet.obj"), options).map_err(|error| error.to_string())
+        let path = Path::new("sheet.obj");
+        let file = ObjFile::parse(text, path).map_err(|error| error.to_string())?;
+        surface(&file, path, options).map_err(|error| error.to_string())
     }
 
     fn read(text: &str) -> Result<TriangleMesh, String> {

@@ -1,4 +1,4 @@
-//! Signals that end a run early: Ctrl-C, a request to terminate, a closed terminal.
+//! Signals that end a program early: Ctrl-C, a request to terminate, a closed terminal.
 
 use std::process::ExitCode;
 use std::sync::Arc;
@@ -30,8 +30,11 @@ pub struct Interrupts {
 
 impl Interrupts {
     /// Listens for signals. The first one sets the flag. One that comes later than a second after it exits at once.
-    /// Signals that were ignored when the program started stay ignored, so that `nohup cloth run` outlives its
+    /// Signals that were ignored when the program started stay ignored, so that a program under `nohup` outlives its
     /// terminal.
+    ///
+    /// # Errors
+    /// If the operating system does not let the program listen.
     pub fn listen() -> Result<Self> {
         let interrupts = Self::default();
         let ignored = ignored_at_start();
@@ -61,14 +64,27 @@ impl Interrupts {
     }
 
     /// Whether a signal has arrived.
+    #[must_use]
     pub fn flag(&self) -> &AtomicBool {
         &self.stop
     }
 
-    /// The exit code of a run that a signal ended: 128 and the number of the signal, as shells report it.
+    /// The exit code of a program that a signal ended: 128 and the number of the signal, as shells report it.
+    #[must_use]
     pub fn exit_code(&self) -> ExitCode {
         ExitCode::from(exit_status(self.last.load(Ordering::Relaxed) as i32))
     }
+}
+
+/// Turns a file that exceeds the limit of the process (`ulimit -f`) from a signal that ends the program into an error of
+/// the write, which names the file.
+///
+/// # Errors
+/// If the operating system does not let the program listen.
+pub fn report_file_limits() -> Result<()> {
+    #[cfg(unix)]
+    flag::register(signal_hook::consts::SIGXFSZ, Arc::default()).context("cannot listen for signals")?;
+    Ok(())
 }
 
 fn exit_status(signal: i32) -> u8 {

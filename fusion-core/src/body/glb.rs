@@ -1,0 +1,106 @@
+//! The container of binary glTF: its header, its description in JSON, and its data.
+
+use gltf::binary::Glb;
+use gltf::json::Root;
+use gltf::json::mesh::{Primitive, Semantic};
+use gltf::json::validation::{Checked, Validate};
+
+/// The largest number of JSON objects. Each takes up to 0.6 kB of memory, however short its text.
+const LARGEST_DESCRIPTION: usize = 400_000;
+/// The largest description, in bytes. Lists of numbers that are not used here take up to 32 times their text.
+const LONGEST_DESCRIPTION: usize = 16 << 20;
+/// Length of the header, in bytes.
+const HEADER: usize = 12;
+
+/// A part of a file that cannot be used.
+#[derive(Debug)]
+pub(super) struct Fault {
+    /// The part, such as `accessor 3`.
+    pub part: String,
+    /// The reason, with a remedy if one is known.
+    pub reason: String,
+}
+
+impl Fault {
+    pub(super) fn new(part: impl Into<String>, reason: impl Into<String>) -> Self {
+        Self { part: part.into(), reason: reason.into() }
+    }
+}
+
+/// A file whose description is valid in itself; accessors are not checked yet.
+#[derive(Debug)]
+pub(super) struct Container<'a> {
+    /// The description.
+    pub root: Root,
+    /// The data.
+    pub data: &'a [u8],
+}
+
+impl<'a> Container<'a> {
+    /// Parses a file, and checks the references of its description.
+    pub(super) fn parse(bytes: &'a [u8]) -> Result<Self, Fault> {
+        let (json, data) = chunks(bytes)?;
+        if json.len() > LONGEST_DESCRIPTION {
+            let reason = format!("expected at most {} MiB, got {} bytes", LONGEST_DESCRIPTION >> 20, json.len());
+            return Err(Fault::new("the description", reason));
+        }
+        let objects = json.iter().filter(|&&byte| byte == b'{').count();
+        if objects > LARGEST_DESCRIPTION {
+            let reason = format!("expected at most {LARGEST_DESCRIPTION} objects, got {objects}");
+            return Err(Fault::new("the description", reason));
+        }
+        let parsed = gltf::json::deserialize::from_slice::<Root>(json);
+        let root = parsed.map_err(|error| Fault::new("the description", error.to_string()))?;
+        check_positions(&root)?;
+        match first_error(&root) {
+            Some(fault) => Err(fault),
+            None => Ok(Self { root, data }),
+        }
+    }
+}
+
+/// Returns the description and the data of a file.
+fn chunks(bytes: &[u8]) -> Result<(&[u8], &[u8]), Fault> {
+    let header = |reason: String| Fault::new("the header", reason);
+    if !bytes.starts_with(b"glTF") {
+        let remedy = "expected `glTF`; export the body as one binary file (.glb)";
+        return Err(header(remedy.into()));
+    }
+    let Some(&[v0, v1, v2, v3, l0, l1, l2, l3]) = bytes.get(4..HEADER) else {
+        return Err(header(format!("expected {HEADER} bytes, got {}", bytes.len())));
+    };
+    let (version, length) = (u32::from_le_bytes([v0, v1, v2, v3]), u32::from_le_bytes([l0, l1, l2, l3]));
+    if version != 2 {
+        return Err(header(format!("expected version 2 of glTF, got {version}")));
+    }
+    if length as usize != bytes.len() {
+        return Err(header(format!("it says {length} bytes, but the file has {}; is it complete?", bytes.len())));
+    }
+    let glb = Glb::from_slice(bytes).map_err(|error| Fault::new("the chunks", error.to_string()))?;
+    match (glb.json, glb.bin) {
+        (std::borrow::Cow::Borrowed(json), Some(std::borrow::Cow::Borrowed(data))) => Ok((json, data)),
+        _ => Err(Fault::new("the chunks", "no embedded data; export the body as one binary file (.glb)")),
+    }
+}
+
+/// Checks the positions of all primitives, which the validation of `gltf` takes for granted.
+fn check_positions(root: &Root) -> Result<(), Fault> {
+    for (number, mesh) in root.meshes.iter().enumerate() {
+        let positions = |primitive: &Primitive| primitive.attributes.get(&Checked::Valid(Semantic::Positions)).copied();
+        if let Some(index) = mesh.primitives.iter().filter_map(positions).find(|at| at.value() >= root.accessors.len())
+        {
+            let reason = format!("there is no accessor {} for positions", index.value());
+            return Err(Fault::new(format!("mesh {number}"), reason));
+        }
+    }
+    Ok(())
+}
+
+/// Returns the first error that the validation of `gltf` finds; `None` if there is none.
+fn first_error(root: &Root) -> Option<Fault> {
+    let mut first = None;
+    root.validate(root, gltf::json::Path::new, &mut |path, error| {
+        first.get_or_insert_with(|| Fault::new(path().to_string(), error.to_string()));
+    });
+    first
+}

@@ -1,0 +1,339 @@
+//! The contents of an OBJ file, as they are written in it.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+
+use energy_files::excerpt;
+
+use crate::lines;
+
+/// The largest size of a file, in bytes: some three million vertices with faces.
+pub const LARGEST_FILE: u64 = 256 << 20;
+/// The largest number of corners of a face.
+pub const MOST_CORNERS: usize = 1 << 16;
+/// The largest number of groups of a face.
+pub const MOST_NAMES: usize = 16;
+
+/// An OBJ file that cannot be read.
+#[derive(Debug, thiserror::Error)]
+#[expect(missing_docs, reason = "the messages name the fields")]
+pub enum ObjFileError {
+    /// The file cannot be read.
+    #[error("cannot read {}", .path.display())]
+    Unreadable { path: PathBuf, source: std::io::Error },
+    /// A line is malformed.
+    #[error("{}:{line}: {reason}: `{text}`", .path.display())]
+    Line {
+        path: PathBuf,
+        /// The line, from 1.
+        line: usize,
+        reason: String,
+        /// The start of the line.
+        text: String,
+    },
+}
+
+/// A corner of a face.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Corner {
+    vertex: u32,
+    /// [`NONE`] without one.
+    uv: u32,
+    normal: u32,
+}
+
+/// Stands for no texture coordinate or normal. Files are too small for so many.
+const NONE: u32 = u32::MAX;
+
+impl Corner {
+    /// Index of the vertex, from 0.
+    #[must_use]
+    pub fn vertex(self) -> usize {
+        self.vertex as usize
+    }
+
+    /// Index of the texture coordinates, from 0; `None` without.
+    #[must_use]
+    pub fn uv(self) -> Option<usize> {
+        (self.uv != NONE).then_some(self.uv as usize)
+    }
+
+    /// Index of the normal, from 0; `None` without.
+    #[must_use]
+    pub fn normal(self) -> Option<usize> {
+        (self.normal != NONE).then_some(self.normal as usize)
+    }
+}
+
+/// A polygon.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Face {
+    /// Range of its corners in the file's.
+    corners: (u32, u32),
+    line: u32,
+    /// Index of its set of groups.
+    groups: u32,
+}
+
+impl Face {
+    /// Its line, from 1.
+    #[must_use]
+    pub fn line(self) -> usize {
+        self.line as usize
+    }
+}
+
+/// The parts of a file that describe a surface.
+#[derive(Debug, Default)]
+pub struct ObjFile {
+    /// Positions of the vertices, in the unit of the file.
+    pub vertices: Vec<[f64; 3]>,
+    /// The line of each vertex, from 1.
+    pub vertex_lines: Vec<u32>,
+    /// Texture coordinates.
+    pub uvs: Vec<[f64; 2]>,
+    /// Number of normals.
+    pub normal_count: usize,
+    /// The faces, in the order of the file.
+    pub faces: Vec<Face>,
+    /// Names of groups, objects and materials, in the order of the file.
+    pub names: Vec<String>,
+    corners: Vec<Corner>,
+    /// Sets of groups, object and material that faces have, as indices of names.
+    group_sets: Vec<Vec<usize>>,
+}
+
+/// A malformed line: its number from 1, the problem, and its text.
+struct Malformed {
+    line: usize,
+    reason: String,
+    text: String,
+}
+
+/// The groups, object and material of the following faces.
+#[derive(Default)]
+struct Current {
+    groups: Vec<usize>,
+    object: Option<usize>,
+    material: Option<usize>,
+    /// Index of their set; `None` before the first face.
+    set: Option<u32>,
+    /// Index of each name.
+    known: BTreeMap<String, usize>,
+}
+
+impl ObjFile {
+    /// Reads a file. The text is UTF-8 or Latin-1.
+    ///
+    /// # Errors
+    /// If the file cannot be read, is not a regular file, is too large, or has a malformed line.
+    pub fn read(path: &Path) -> Result<Self, ObjFileError> {
+        let contents = energy_files::read(path, LARGEST_FILE);
+        let contents = contents.map_err(|source| ObjFileError::Unreadable { path: path.to_owned(), source })?;
+        Self::parse(&lines::decoded(contents), path)
+    }
+
+    /// Parses a text. Statements that do not describe a surface are ignored. The path is used in messages.
+    ///
+    /// # Errors
+    /// If a line is malformed, or a face refers to something that the file lacks.
+    ///
+    /// ```
+    /// use std::path::Path;
+    /// let file = mesh_obj::ObjFile::parse("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", Path::new("a.obj"))?;
+    /// let corners = file.corners(file.faces[0]);
+    /// assert_eq!(corners.iter().map(|corner| corner.vertex()).collect::<Vec<_>>(), [0, 1, 2]);
+    /// let error = mesh_obj::ObjFile::parse("v 0 0 zero\n", Path::new("a.obj")).unwrap_err();
+    /// assert_eq!(error.to_string(), "a.obj:1: expected a number, got `zero`: `v 0 0 zero`");
+    /// # Ok::<(), mesh_obj::ObjFileError>(())
+    /// ```
+    pub fn parse(text: &str, path: &Path) -> Result<Self, ObjFileError> {
+        Self::parse_lines(text).map_err(|Malformed { line, reason, text }| {
+            let path = path.to_owned();
+            ObjFileError::Line { path, line, reason, text }
+        })
+    }
+
+    /// The corners of a face.
+    ///
+    /// # Panics
+    /// If the face belongs to another file.
+    #[must_use]
+    pub fn corners(&self, face: Face) -> &[Corner] {
+        &self.corners[face.corners.0 as usize..face.corners.1 as usize]
+    }
+
+    /// The groups, object and material of a face, as indices of names.
+    ///
+    /// # Panics
+    /// If the face belongs to another file.
+    #[must_use]
+    pub fn groups(&self, face: Face) -> &[usize] {
+        &self.group_sets[face.groups as usize]
+    }
+
+    fn parse_lines(text: &str) -> Result<Self, Malformed> {
+        let (mut file, mut current) = (Self::default(), Current::default());
+        let malformed = |line: usize, text: &str, reason: String| {
+            let text = excerpt(text.trim()).into_owned();
+            Malformed { line, reason, text }
+        };
+        for (line, text) in lines::logical(text) {
+            file.add(line, &text, &mut current).map_err(|reason| malformed(line, &text, reason))?;
+        }
+        let broken = file.faces.iter().find_map(|face| Some((face.line(), file.missing(*face)?)));
+        let Some((line, reason)) = broken else { return Ok(file) };
+        let text = lines::logical(text).find(|(number, _)| *number == line);
+        Err(malformed(line, &text.map_or("".into(), |(_, text)| text), reason))
+    }
+
+    fn add(&mut self, line: usize, text: &str, current: &mut Current) -> Result<(), String> {
+        let mut words = text.split_whitespace();
+        match words.next() {
+            Some("v") => {
+                self.vertices.push(numbers(words)?);
+                self.vertex_lines.push(line as u32);
+            }
+            Some("vt") => {
+                // A missing second coordinate is 0.
+                let [u, v] = numbers(words.chain(["0"]).take(2))?;
+                self.uvs.push([u, v]);
+            }
+            Some("vn") => self.normal_count += 1,
+            Some("f") => self.add_face(line, words, current)?,
+            Some("g") => {
+                let names: Vec<&str> = words.take(MOST_NAMES + 1).collect();
+                if names.len() > MOST_NAMES {
+                    return Err(format!("expected at most {MOST_NAMES} groups"));
+                }
+                current.groups = names.into_iter().map(|name| self.name(name, current)).collect();
+                current.set = None;
+            }
+            Some(keyword @ ("o" | "usemtl")) => {
+                let name = text.trim_start()[keyword.len()..].trim();
+                let named = (!name.is_empty()).then(|| self.name(name, current));
+                *(if keyword == "o" { &mut current.object } else { &mut current.material }) = named;
+                current.set = None;
+            }
+            _ => {}
+        }
+        Ok(())
+    }
+
+    fn add_face<'a>(
+        &mut self,
+        line: usize,
+        words: impl Iterator<Item = &'a str>,
+        current: &mut Current,
+    ) -> Result<(), String> {
+        let start = self.corners.len();
+        for word in words {
+            if self.corners.len() - start == MOST_CORNERS {
+                return Err(format!("a face has at most {MOST_CORNERS} corners"));
+            }
+            let corner = self.corner(word)?;
+            self.corners.push(corner);
+        }
+        let count = self.corners.len() - start;
+        if count < 3 {
+            return Err(format!("a face needs at least three corners, got {count}"));
+        }
+        let groups = *current.set.get_or_insert_with(|| {
+            let named = current.groups.iter().copied().chain(current.object).chain(current.material);
+            self.group_sets.push(named.collect::<BTreeSet<usize>>().into_iter().collect());
+            self.group_sets.len() as u32 - 1
+        });
+        let corners = (start as u32, self.corners.len() as u32);
+        self.faces.push(Face { corners, line: line as u32, groups });
+        Ok(())
+    }
+
+    fn name(&mut self, name: &str, current: &mut Current) -> usize {
+        if let Some(&known) = current.known.get(name) {
+            return known;
+        }
+        self.names.push(name.to_owned());
+        current.known.insert(name.to_owned(), self.names.len() - 1);
+        self.names.len() - 1
+    }
+
+    /// Parses `vertex`, `vertex/uv`, `vertex//normal` or `vertex/uv/normal`.
+    fn corner(&self, word: &str) -> Result<Corner, String> {
+        let mut fields = word.split('/');
+        let mut index = |count: usize| match fields.next() {
+            None | Some("") => Ok(NONE),
+            Some(field) => index(field, count),
+        };
+        let (vertex, uv, normal) = (index(self.vertices.len())?, index(self.uvs.len())?, index(self.normal_count)?);
+        if vertex == NONE {
+            return Err(format!("expected the number of a vertex, got `{}`", excerpt(word)));
+        }
+        Ok(Corner { vertex, uv, normal })
+    }
+
+    /// Describes what a face refers to in vain; `None` if everything exists.
+    fn missing(&self, face: Face) -> Option<String> {
+        let reason =
+            |what: &str, count: usize| format!("the face refers to a {what} that is not among the {count} of the file");
+        let counts = (self.vertices.len(), self.uvs.len(), self.normal_count);
+        self.corners(face).iter().find_map(|corner| match corner {
+            corner if corner.vertex() >= counts.0 => Some(reason("vertex", counts.0)),
+            corner if corner.uv().is_some_and(|uv| uv >= counts.1) => Some(reason("texture coordinate", counts.1)),
+            corner if corner.normal().is_some_and(|normal| normal >= counts.2) => Some(reason("normal", counts.2)),
+            _ => None,
+        })
+    }
+}
+
+/// Parses an index: from 1, or from −1 backwards among the `count` before the line. Returns it from 0.
+fn index(field: &str, count: usize) -> Result<u32, String> {
+    let number: i64 = field.parse().map_err(|_| format!("expected a whole number, got `{}`", excerpt(field)))?;
+    let from_zero = if number > 0 { Some(number - 1) } else { (count as i64).checked_add(number) };
+    match from_zero.map(u32::try_from) {
+        Some(Ok(index)) if number != 0 && index != NONE => Ok(index),
+        _ => Err(format!("the face refers to a vertex that is not among the {count} of the file")),
+    }
+}
+
+/// Parses the first N words as numbers; ignores the others, such as weights and colours.
+fn numbers<'a, const N: usize>(words: impl Iterator<Item = &'a str>) -> Result<[f64; N], String> {
+    let (mut numbers, mut count) = ([0.0; N], 0);
+    for (number, word) in numbers.iter_mut().zip(words) {
+        *number = word.parse().map_err(|_| format!("expected a number, got `{}`", excerpt(word)))?;
+        count += 1;
+    }
+    if count == N { Ok(numbers) } else { Err(format!("expected {N} numbers, got {count}")) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn message(text: &str) -> String {
+        ObjFile::parse(text, Path::new("a.obj")).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn faces_have_a_limit_and_messages_are_short() {
+        let triangle = "v 0 0 0\nv 1 0 0\nv 0 1 0\n";
+        let error = message(&format!("{triangle}f {}\n", "1 ".repeat(10_000_000)));
+        assert!(error.starts_with("a.obj:4: a face has at most 65536 corners: `f 1 1"), "{error}");
+        assert!(error.len() < 300, "{} bytes", error.len());
+        for long in ["v 0 0 x", "f 1 2 ", "f 1 2 3 4/"] {
+            let error = message(&format!("{triangle}{long}{}\n", "9".repeat(1_000_000)));
+            assert!(error.len() < 500, "{long}: {} bytes", error.len());
+        }
+        let error = message(&format!("g {}\n", "a ".repeat(17)));
+        assert!(error.contains("at most 16 groups"), "{error}");
+        assert!(message(&format!("{triangle}f 1 2 {}\n", i64::MIN)).contains("not among the 3"));
+        assert!(message(&format!("{triangle}f 1 2 4294967296\n")).contains("not among the 3"));
+    }
+
+    #[test]
+    fn many_names_take_no_time() {
+        let text: String = (0..200_000).map(|i| format!("usemtl m{i}\nv 0 0 0\n")).collect();
+        let start = std::time::Instant::now();
+        assert_eq!(ObjFile::parse(&text, Path::new("a.obj")).unwrap().names.len(), 200_000);
+        assert!(start.elapsed().as_secs_f64() < 5.0, "{:?}", start.elapsed());
+    }
+}
