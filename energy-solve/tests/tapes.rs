@@ -192,8 +192,11 @@ impl OwnLaw for OwnSprings {
     }
 }
 
-/// The sum of a term over five vertices, the second of them pinned: energy, force, and the whole matrix.
-fn summed(term: Box<dyn Term>, curvature: Curvature) -> (f64, Vec<Vector3<f64>>, Vec<(usize, usize, f64)>) {
+/// Energy, force, and the whole matrix.
+type Summed = (f64, Vec<Vector3<f64>>, Vec<(usize, usize, f64)>);
+
+/// The sum of a term over five vertices, the second of them pinned.
+fn summed(term: Box<dyn Term>, curvature: Curvature) -> Summed {
     let x: Vec<Vector3<f64>> = (0..5).map(|i| [0.3 * f64::from(i), f64::from(i * i), 0.1]).collect();
     let v = vec![[0.0; 3]; 5];
     let mut system = System::new(vec![term], &[false, true, false, false, false]).unwrap();

@@ -17,6 +17,9 @@ use crate::motion::{SteeredPoses, Steering};
 use crate::scene::Scene;
 use crate::wind::SteeredVelocity;
 
+/// A label of terms, and their forces on all vertices.
+pub type LabelledForces = (String, Vec<Vector3<f64>>);
+
 /// A force or an energy that a program adds to a scene.
 pub trait OwnForce: Send + Sync {
     /// Name in the ledger and in messages.
@@ -259,8 +262,7 @@ impl Simulation {
         }
         let crossings = if self.contact == crate::scene::ContactChoice::On { self.crossings() } else { Vec::new() };
         if let Some(first) = crossings.first() {
-            let corners = first.triangle.map(|vertex| vertex as usize);
-            let first = self.triangles.iter().position(|triangle| *triangle == corners).unwrap_or_default();
+            let first = self.triangles.iter().position(|triangle| *triangle == first.triangle).unwrap_or_default();
             return Some(ControlError::Crossing { count: crossings.len(), first });
         }
         let time = self.time();
@@ -388,7 +390,7 @@ impl Simulation {
     ///
     /// # Errors
     /// Returns an error if a term cannot be evaluated.
-    pub fn term_forces(&mut self) -> Result<Vec<(String, Vec<Vector3<f64>>)>, EvaluationError> {
+    pub fn term_forces(&mut self) -> Result<Vec<LabelledForces>, EvaluationError> {
         let names = self.labels.iter().map(|label| label.name.clone());
         let mut forces: Vec<_> = names.map(|name| (name, vec![[0.0; 3]; self.x.len()])).collect();
         for island in &self.islands {
