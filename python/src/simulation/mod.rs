@@ -73,6 +73,9 @@ impl Snapshot {
     }
 }
 
+/// The rotation and the translation of a pose.
+type PoseArrays<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray1<f64>>);
+
 /// Columns of a ledger: name and numbers.
 type Columns<'py> = Vec<(String, Bound<'py, PyArray1<f64>>)>;
 /// Vertices (-1 for obstacles), distances, normals and forces of pairs in contact.
@@ -287,11 +290,7 @@ impl Simulation {
     }
 
     /// Returns R, of shape (3, 3), and t of an obstacle at the end of the next step, if nothing else is set.
-    fn obstacle_pose<'py>(
-        &self,
-        py: Python<'py>,
-        obstacle: &str,
-    ) -> PyResult<(Bound<'py, PyArray2<f64>>, Bound<'py, PyArray1<f64>>)> {
+    fn obstacle_pose<'py>(&self, py: Python<'py>, obstacle: &str) -> PyResult<PoseArrays<'py>> {
         let pose = self.inner.get()?.pose(obstacle).map_err(refused)?;
         Ok((vectors(py, &pose.rows())?, PyArray1::from_slice(py, &pose.translation())))
     }

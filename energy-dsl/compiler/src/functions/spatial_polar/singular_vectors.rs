@@ -15,8 +15,9 @@ const STEPS: usize = 3;
 const LARGEST_TURN: f64 = 0.125;
 /// Larger ratios of consecutive corrections are rounding.
 const LARGEST_RATIO: f64 = 0.25;
-/// If σ₂ + σ₃ is less than this part of σ₁, then R is taken as 0: 400 roundoffs, in double and in single precision.
-const LEAST_GAP: (f64, f64) = (4.4e-14, 2.4e-5);
+/// If σ₂ + σ₃ is less than this part of σ₁, then R is taken as 0: 490 roundoffs, in double and in single
+/// precision, where errors of R reach 0.1.
+const LEAST_GAP: (f64, f64) = (5.4e-14, 2.9e-5);
 
 /// Computes R, K⁻¹ and T of a matrix. The mask tells where σ₂ + σ₃ is 0 up to rounding: there, R and K⁻¹ are 0.
 pub(super) fn factors(g: &mut Graph, arguments: &[NodeId], f: &Matrix) -> (Factors, NodeId) {
