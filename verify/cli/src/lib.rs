@@ -1,7 +1,7 @@
 //! Support for the workspace's command-line programs.
 //!
 //! * [`write_file`] writes a file completely or not at all.
-//! * [`print`] and [`tell`] print texts without control characters.
+//! * [`print()`] and [`tell`] print texts without control characters.
 //! * [`Interrupts`] ends a program at a signal, after its current step; [`report_file_limits`] makes errors of others.
 //! * [`message`] formats an error and its causes on one line.
 //! * [`plot`] draws curves as SVG.
