@@ -253,6 +253,10 @@ fn sleeping_and_pinned_vertices_cost_little() {
         let excess = ratios.iter().filter(|ratio| ratio.value() >= 3.0 * ratio.target);
         excess.map(|ratio| format!("{}: {}", ratio.question, ratio.value())).collect::<Vec<_>>()
     };
-    let runs: Vec<Vec<String>> = std::iter::repeat_with(excess).take(4).collect();
-    assert!(runs.iter().any(Vec::is_empty), "{runs:?}");
+    let mut found = Vec::new();
+    let is_cheap = (0..4).any(|_| {
+        found = excess();
+        found.is_empty()
+    });
+    assert!(is_cheap, "{found:?}");
 }
