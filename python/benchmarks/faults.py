@@ -58,7 +58,7 @@ if __name__ == "__main__":
     sweep = ed.sweep(scene, grid, output, executor=executor, checkpoint=2)
     print(len(sweep.failures), "failed", [run["message"] for run in sweep.failures])
 """
-TIMED = {"times.csv", "sweep.html", "sweep.json", "summary.txt", "checkpoint", "cloth.lock"}
+TIMED = {"times.csv", "sweep.html", "sweep.json", "summary.txt", "checkpoint", "checkpoint.previous", "cloth.lock"}
 
 
 def files(folder: Path) -> dict[str, bytes]:

@@ -117,7 +117,8 @@ def _again(folder: Path, why: str, whole: bool) -> None:
     warnings.warn(f"run {folder.name}: {why}; the run is done again", RuntimeWarning, stacklevel=4)
     (folder / RECORD).unlink(missing_ok=True)
     if whole:
-        (folder / "checkpoint").unlink(missing_ok=True)
+        for name in ("checkpoint", "checkpoint.previous"):
+            (folder / name).unlink(missing_ok=True)
 
 
 def _run_marked(job: dict[str, Any], folder: Path) -> dict[str, Any]:

@@ -35,7 +35,7 @@ def files(folder):
             return json.dumps(record).encode()
         return path.read_bytes()
 
-    timed = {"times.csv", "sweep.html", "sweep.json", "summary.txt", "checkpoint", "cloth.lock"}
+    timed = {"times.csv", "sweep.html", "sweep.json", "summary.txt", "checkpoint", "checkpoint.previous", "cloth.lock"}
     paths = (path for path in folder.rglob("*") if path.is_file() and path.name not in timed)
     return {str(path.relative_to(folder)): timeless(path) for path in paths}
 
