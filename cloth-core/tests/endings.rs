@@ -1,10 +1,10 @@
 //! How runs end: by a failed step, by signals, while files are written.
 
 use std::path::Path;
-use std::process::{Child, Command, Output, Stdio};
+use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
-use tempfile::TempDir;
+use crate::runs::{cloth, with_scene};
 
 /// A sheet that symplectic Euler cannot step stably.
 const UNSTABLE: &str = r#"dt = 0.01
@@ -23,16 +23,6 @@ material.stvk = { stretch_stiffness = 500.0, poisson_ratio = 0.3 }
 [[pins]]
 nearest = [-0.5, 0.5, 0.0]
 "#;
-
-fn with_scene(text: &str) -> TempDir {
-    let folder = TempDir::new().unwrap();
-    std::fs::write(folder.path().join("scene.toml"), text).unwrap();
-    folder
-}
-
-fn cloth(arguments: &[&str], folder: &Path) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_cloth")).args(arguments).current_dir(folder).output().unwrap()
-}
 
 fn read(folder: &Path, name: &str) -> Vec<u8> {
     std::fs::read(folder.join(name)).unwrap_or_else(|error| panic!("{name}: {error}"))

@@ -9,6 +9,8 @@ use std::time::{Duration, Instant};
 use cloth_core::run::Checkpoint;
 use tempfile::TempDir;
 
+use crate::runs::with_scene;
+
 const SCENE: &str = r#"dt = 0.01
 duration = 0.2
 frames_per_second = 50
@@ -28,12 +30,6 @@ vertex = 0
 picture = false
 ledger = true
 "#;
-
-fn with_scene(text: &str) -> TempDir {
-    let folder = TempDir::new().unwrap();
-    std::fs::write(folder.path().join("scene.toml"), text).unwrap();
-    folder
-}
 
 /// Runs the program with 4 GB of address space.
 fn cloth(arguments: &[&str], folder: &Path) -> Output {

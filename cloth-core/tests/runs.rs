@@ -50,11 +50,13 @@ friction = 0.3
 velocity = [1.0, 0.5, 0.0]
 "#;
 
-fn cloth(arguments: &[&str], folder: &Path) -> Output {
+/// Runs the program in a folder.
+pub(crate) fn cloth(arguments: &[&str], folder: &Path) -> Output {
     Command::new(env!("CARGO_BIN_EXE_cloth")).args(arguments).current_dir(folder).output().unwrap()
 }
 
-fn with_scene(text: &str) -> TempDir {
+/// Creates a folder with a scene.
+pub(crate) fn with_scene(text: &str) -> TempDir {
     let folder = TempDir::new().unwrap();
     std::fs::write(folder.path().join("scene.toml"), text).unwrap();
     folder

@@ -12,7 +12,7 @@ use fastrand::Rng;
 use verify::Sample;
 use verify::multiprecision::{self, Big, TrueBlock};
 
-use crate::singular_programs::{Blocks, Limit, limit};
+use crate::singular_programs::{Blocks, Limit, full, largest, limit, spread_between};
 
 const POTENTIALS: &str = include_str!("../data/foreign_potentials.energy");
 /// Rays through a singular input.
@@ -112,28 +112,12 @@ fn doubles(block: &TrueBlock) -> Vec<f64> {
     block.block.numbers.iter().map(Big::to_f64).collect()
 }
 
-/// Expands the triangle of blocks of a Hessian to all its numbers.
-fn expanded(blocks: &[Vec<f64>], coordinates: usize) -> Vec<Vec<f64>> {
-    let mut blocks = blocks.to_vec();
+/// Expands the triangle of blocks of a Hessian, if there is one.
+fn expanded(mut blocks: Vec<Vec<f64>>, coordinates: usize) -> Vec<Vec<f64>> {
     if let Some(triangle) = blocks.get_mut(2) {
-        let points = coordinates / 3;
-        let block = |i: usize, j: usize| i * points - i * (i + 1) / 2 + j;
-        let entry = |row: usize, column: usize| {
-            let ([i, r], [j, c]) = ([row / 3, row % 3], [column / 3, column % 3]);
-            let (at, r, c) = if i <= j { (block(i, j), r, c) } else { (block(j, i), c, r) };
-            triangle[9 * at + 3 * r + c]
-        };
-        *triangle = (0..coordinates * coordinates).map(|at| entry(at / coordinates, at % coordinates)).collect();
+        *triangle = full(triangle, coordinates / 3);
     }
     blocks
-}
-
-fn largest_difference(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
-}
-
-fn largest(numbers: &[f64]) -> f64 {
-    numbers.iter().fold(0.0, |largest, x| largest.max(x.abs()))
 }
 
 #[test]
@@ -150,10 +134,10 @@ fn random_inputs_are_right_to_2e_13() {
                 // Outside of the domain.
                 continue;
             }
-            let blocks = expanded(&blocks, coordinates);
+            let blocks = expanded(blocks, coordinates);
             let truth = multiprecision::truth(potential.declaration(), &potential.textbook, &sample, 40);
             for (found, truth) in blocks.iter().zip(&truth) {
-                let error = largest_difference(found, &doubles(truth)) / truth.largest().max(1e-3);
+                let error = spread_between(found, &doubles(truth)) / truth.largest().max(1e-3);
                 assert!(error <= accuracy, "{} at {sample:?}: {error:e}", potential.declaration().name);
                 if accuracy == ACCURACY {
                     worst = worst.max(error);
@@ -197,7 +181,7 @@ impl Potential {
         let rays = self.around(sample, 2.0_f64.powi(-100));
         for (order, (blocks, flags)) in found.into_iter().enumerate() {
             let flagged = flags.degenerate || flags.kink;
-            let blocks = expanded(&blocks, self.element.coordinates());
+            let blocks = expanded(blocks, self.element.coordinates());
             let what = || format!("{} {} at {sample:?}", self.declaration().name, ROUTINES[order]);
             if !flagged && !blocks.iter().flatten().all(|number| number.is_finite()) {
                 seen.wrong.push(format!("{}: not finite", what()));
@@ -218,7 +202,7 @@ impl Potential {
             }
             for (found, limit) in blocks.iter().zip(&limits) {
                 let Limit::Numbers(truth) = limit else { continue };
-                let error = largest_difference(found, truth) / largest(truth).max(1e-3);
+                let error = spread_between(found, truth) / largest(truth).max(1e-3);
                 if !flagged && error > self.accuracy().max(1e-8) {
                     seen.wrong.push(format!("{}: error {error:e}", what()));
                 }
@@ -230,7 +214,7 @@ impl Potential {
 
 /// Returns whether blocks are those of some rays, while all others have another value.
 fn is_one_side(blocks: &[Vec<f64>], rays: &[Blocks]) -> bool {
-    let is_near = |a: &[f64], b: &[f64]| largest_difference(a, b) <= 1e-8 * largest(b).max(1e-3);
+    let is_near = |a: &[f64], b: &[f64]| spread_between(a, b) <= 1e-8 * largest(b).max(1e-3);
     let (same, others): (Vec<&Blocks>, Vec<&Blocks>) = rays.iter().partition(|ray| is_near(&blocks[0], &ray[0]));
     let are_found = same.iter().all(|ray| blocks.iter().zip(ray.iter()).all(|(found, limit)| is_near(found, limit)));
     !same.is_empty() && are_found && others.iter().all(|ray| is_near(&ray[0], &others[0][0]))

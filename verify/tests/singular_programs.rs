@@ -6,7 +6,7 @@
 use std::sync::LazyLock;
 
 use energy_compiler::{Interpreted, Textbook};
-use energy_dsl::{Declaration, Inputs};
+use energy_dsl::{Declaration, Inputs, triangle_index};
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 use verify::Sample;
@@ -202,11 +202,11 @@ fn narrow_direction(random: &mut fastrand::Rng) -> [f64; 9] {
     direction
 }
 
-fn largest(numbers: &[f64]) -> f64 {
+pub(crate) fn largest(numbers: &[f64]) -> f64 {
     numbers.iter().fold(0.0, |largest, x| largest.max(x.abs()))
 }
 
-fn spread_between(a: &[f64], b: &[f64]) -> f64 {
+pub(crate) fn spread_between(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).fold(0.0, |largest, (a, b)| largest.max((a - b).abs()))
 }
 
@@ -306,7 +306,7 @@ fn check(formula: &str, k: f64, x: &[f64]) -> Result<(), TestCaseError> {
             if !exists && block > 0 {
                 continue;
             }
-            let found = if block == 2 { full(&groups[2]) } else { groups[block].clone() };
+            let found = if block == 2 { full(&groups[2], 3) } else { groups[block].clone() };
             let scale = truth.iter().fold(1e-3_f64, |scale, x| scale.max(x.abs()));
             for (a, b) in found.iter().zip(truth) {
                 prop_assert!((a - b).abs() <= 1e-8 * scale, "{source}\nat {x:?}, block {block}: {a:e}, truly {b:e}");
@@ -325,14 +325,15 @@ fn is_flagged_nearby(element: &Interpreted, routine: &str, k: f64, x: &[f64]) ->
     })
 }
 
-/// Expands the triangle of blocks of three points to a matrix.
-fn full(triangle: &[f64]) -> Vec<f64> {
+/// Expands the triangle of blocks of some points to a matrix.
+pub(crate) fn full(triangle: &[f64], points: usize) -> Vec<f64> {
     let entry = |row: usize, column: usize| {
         let (row, column) = if row / 3 <= column / 3 { (row, column) } else { (column, row) };
-        let block = [[0, 1, 2], [1, 3, 4], [2, 4, 5]][row / 3][column / 3];
+        let block = triangle_index(points, row / 3, column / 3);
         triangle[9 * block + 3 * (row % 3) + column % 3]
     };
-    (0..81).map(|i| entry(i / 9, i % 9)).collect()
+    let size = 3 * points;
+    (0..size * size).map(|i| entry(i / size, i % size)).collect()
 }
 
 /// `max` returns the other number where one is NaN, but its derivatives are NaN.

@@ -273,8 +273,7 @@ impl Bundle {
             Self::Same(series) if !is_long() && series.is_defined() => {
                 let all = Outcomes::first(RAYS.get());
                 if let [term] = series.terms()
-                    && term.order().is_in_steps_from(Order::ONE)
-                    && term.order().power == 0.0
+                    && term.order().compare(Order::ONE) == Ordering::Equal
                     && series.is_exact()
                 {
                     let (factor, size) = term.plain()?;
