@@ -6,12 +6,13 @@
 use std::borrow::Cow;
 use std::cell::Cell;
 use std::cmp::Ordering;
+use std::ops::BitOr;
 
 use super::coefficients::{Coefficients, Row};
 use super::outcomes::{LANES, Outcomes};
 use super::real::Mask;
 use super::rows::Rows;
-use super::series::{LENGTHS, Order, Series, Term, length};
+use super::series::{Limit, MOST_ROWS, Order, Series, Term, binomial, length, logarithmic};
 use super::unbounded::Unbounded;
 
 thread_local! {
@@ -24,21 +25,53 @@ pub(super) fn set_rays(rays: usize) {
     RAYS.set(rays);
 }
 
+/// Returns the rays of a bundle.
+pub(super) fn rays() -> Outcomes {
+    Outcomes::first(RAYS.get())
+}
+
 /// Numbers with more parts than this stay apart.
 const MOST_PARTS: usize = 6;
+
+/// Rays along which a number is undefined.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Undefined {
+    rays: Outcomes,
+    /// Those of them along which more terms might tell more.
+    open: Outcomes,
+}
+
+impl Undefined {
+    fn surely(rays: Outcomes) -> Self {
+        Self { rays, open: Outcomes::NONE }
+    }
+
+    fn select(outcomes: Outcomes, yes: Self, no: Self) -> Self {
+        let of = |yes, no| yes & outcomes | no & !outcomes;
+        Self { rays: of(yes.rays, no.rays), open: of(yes.open, no.open) }
+    }
+}
+
+impl BitOr for Undefined {
+    type Output = Self;
+    fn bitor(self, other: Self) -> Self {
+        let surely = self.rays & !self.open | other.rays & !other.open;
+        Self { rays: self.rays | other.rays, open: (self.open | other.open) & !surely }
+    }
+}
 
 /// A sum of rows whose powers do not overlap.
 #[derive(Clone, Debug)]
 pub(super) struct Sum {
     part: Rows,
     others: Vec<Rows>,
-    /// Rays along which the number is undefined. Their coefficients are 0.
-    undefined: Outcomes,
+    /// Where the number is undefined. Coefficients are 0 there.
+    undefined: Undefined,
 }
 
 impl Sum {
-    fn of(part: Rows, undefined: Outcomes) -> Self {
-        Self { part: part.cleared(undefined), others: Vec::new(), undefined }
+    fn of(part: Rows, undefined: Undefined) -> Self {
+        Self { part: part.cleared(undefined.rays), others: Vec::new(), undefined }
     }
 
     fn parts(&self) -> impl Iterator<Item = &Rows> {
@@ -57,14 +90,14 @@ impl Sum {
             return Some(());
         }
         if self.part.is_zero() {
-            self.part = part.signed(negative).cleared(self.undefined);
+            self.part = part.signed(negative).cleared(self.undefined.rays);
             return Some(());
         }
         let parts = self.others.len() + 1;
         let own = std::iter::once(&mut self.part).chain(&mut self.others).find(|own| own.overlaps(part));
         match own {
-            Some(own) => *own = own.plus(part, sign)?.cleared(self.undefined),
-            None if parts < MOST_PARTS => self.others.push(part.signed(negative).cleared(self.undefined)),
+            Some(own) => *own = own.plus(part, sign)?.cleared(self.undefined.rays),
+            None if parts < MOST_PARTS => self.others.push(part.signed(negative).cleared(self.undefined.rays)),
             None => return None,
         }
         if !self.others.is_empty() {
@@ -86,7 +119,7 @@ impl Sum {
     }
 
     /// Adds parts.
-    fn total(parts: impl Iterator<Item = Option<Rows>>, undefined: Outcomes) -> Option<Self> {
+    fn total(parts: impl Iterator<Item = Option<Rows>>, undefined: Undefined) -> Option<Self> {
         let mut sum = Self::of(Rows::zero(), undefined);
         for part in parts {
             sum.add(&part?, 1.0)?;
@@ -95,16 +128,21 @@ impl Sum {
     }
 
     fn plus(&self, other: &Self, sign: f64) -> Option<Self> {
+        if let (Some(a), Some(b)) = (self.single(), other.single())
+            && a.overlaps(b)
+        {
+            return Some(Self::of(a.plus(b, sign)?, self.undefined | other.undefined));
+        }
         let mut sum = self.clone().undefined_along(other.undefined);
         other.parts().try_for_each(|part| sum.add(part, sign))?;
         Some(sum)
     }
 
-    fn undefined_along(mut self, rays: Outcomes) -> Self {
-        if self.undefined | rays != self.undefined {
-            self.undefined = self.undefined | rays;
-            self.part = self.part.cleared(rays);
-            self.others = self.others.into_iter().map(|part| part.cleared(rays)).collect();
+    fn undefined_along(mut self, undefined: Undefined) -> Self {
+        if self.undefined | undefined != self.undefined {
+            self.undefined = self.undefined | undefined;
+            self.part = self.part.cleared(undefined.rays);
+            self.others = self.others.into_iter().map(|part| part.cleared(undefined.rays)).collect();
         }
         self
     }
@@ -117,32 +155,78 @@ impl Sum {
         Self::total(self.parts().flat_map(|a| other.parts().map(move |b| a.times(b))), undefined)
     }
 
+    /// Splits t (1 + r) into the term t and r; `None` if rays begin with different powers.
+    fn split(&self) -> Option<(Rows, Self)> {
+        let order = |part: &Rows| part.first_order();
+        let larger = |a, b| if order(b).is_larger_than(order(a)) { b } else { a };
+        let first = self.parts().reduce(larger)?;
+        let [head, rest] = first.headed(self.undefined.rays)?;
+        let others = self.parts().filter(|part| !std::ptr::eq(*part, first));
+        let slight = others.chain([&rest]).map(|part| Some(part.over(&head, self.undefined.rays)?.0));
+        Some((head, Self::total(slight, self.undefined)?))
+    }
+
+    fn scaled(&self, by: f64) -> Option<Self> {
+        Self::total(self.parts().map(|part| part.scaled(by)), self.undefined)
+    }
+
+    /// Returns Σ coefficient(k) rᵏ for an infinitesimal r.
+    fn composed(&self, coefficient: impl Fn(usize) -> f64) -> Option<Self> {
+        let constant = |value: f64| Some(Self::of(Rows::constant([value; LANES])?, self.undefined));
+        let (mut sum, mut power) = (constant(coefficient(0))?, constant(1.0)?);
+        if self.parts().all(Rows::is_zero) {
+            return Some(sum);
+        }
+        for k in 1..=length() {
+            power = power.times(self)?;
+            sum = sum.plus(&power.scaled(coefficient(k))?, 1.0)?;
+        }
+        let leading = self.parts().map(Rows::first_order).fold(Order::NEVER, Order::larger);
+        sum.add(&Rows::unknown(leading.raised(length() as f64 + 1.0)), 1.0)?;
+        Some(sum)
+    }
+
     fn over(&self, other: &Self) -> Option<Self> {
-        let divisor = other.single()?;
+        let Some(divisor) = other.single() else { return self.times(&other.raised(-1.0)?) };
         let mut undefined = self.undefined | other.undefined;
-        let quotients: Option<Vec<_>> = self.parts().map(|part| part.over(divisor, undefined)).collect();
+        let quotients: Option<Vec<_>> = self.parts().map(|part| part.over(divisor, undefined.rays)).collect();
         let quotients = quotients?;
-        undefined = quotients.iter().fold(undefined, |all, (_, zero)| all | *zero);
+        undefined = quotients.iter().fold(undefined, |all, (_, zero)| all | Undefined::surely(*zero));
         Self::total(quotients.into_iter().map(|(quotient, _)| Some(quotient)), undefined)
     }
 
     fn raised(&self, exponent: f64) -> Option<Self> {
-        let (raised, negative) = self.single()?.raised(exponent, self.undefined)?;
-        Some(Self::of(raised, self.undefined | negative))
+        if let Some(part) = self.single() {
+            let (raised, negative) = part.raised(exponent, self.undefined.rays)?;
+            return Some(Self::of(raised, self.undefined | Undefined::surely(negative)));
+        }
+        let (head, rest) = self.split()?;
+        let (raised, negative) = head.raised(exponent, self.undefined.rays)?;
+        rest.composed(|k| binomial(exponent, k))?.times(&Self::of(raised, self.undefined | Undefined::surely(negative)))
     }
 
     fn ln(&self) -> Option<Self> {
-        let (parts, negative) = self.single()?.ln(self.undefined)?;
-        Self::total(parts.into_iter().map(Some), self.undefined | negative)
+        if let Some(part) = self.single() {
+            let (parts, negative) = part.ln(self.undefined.rays)?;
+            return Self::total(parts.into_iter().map(Some), self.undefined | Undefined::surely(negative));
+        }
+        let (head, rest) = self.split()?;
+        let (parts, negative) = head.ln(self.undefined.rays)?;
+        let logarithm = Self::total(parts.into_iter().map(Some), self.undefined | Undefined::surely(negative))?;
+        rest.composed(logarithmic)?.plus(&logarithm, 1.0)
     }
 
     fn exp(&self) -> Option<Self> {
         Some(Self::of(self.single()?.exp()?, self.undefined))
     }
 
+    fn sin_cos(&self) -> Option<[Self; 2]> {
+        Some(self.single()?.sin_cos()?.map(|part| Self::of(part, self.undefined)))
+    }
+
     fn angle(&self, x: &Self) -> Option<Self> {
         let undefined = self.undefined | x.undefined;
-        let parts = self.single()?.angle(x.single()?, undefined)?;
+        let parts = self.single()?.angle(x.single()?, undefined.rays)?;
         Self::total(parts.into_iter().map(Some), undefined)
     }
 
@@ -152,9 +236,9 @@ impl Sum {
     }
 
     fn select(outcomes: Outcomes, yes: &Self, no: &Self) -> Option<Self> {
-        let undefined = yes.undefined & outcomes | no.undefined & !outcomes;
-        let parts = yes.parts().map(|part| part.clone().cleared(!outcomes));
-        Self::total(parts.chain(no.parts().map(|part| part.clone().cleared(outcomes))).map(Some), undefined)
+        let undefined = Undefined::select(outcomes, yes.undefined, no.undefined);
+        let parts = yes.parts().map(|part| part.cleared(!outcomes));
+        Self::total(parts.chain(no.parts().map(|part| part.cleared(outcomes))).map(Some), undefined)
     }
 
     /// Returns the order of the first unknown term.
@@ -164,60 +248,61 @@ impl Sum {
 
     /// Returns the largest known term along a ray.
     fn first(&self, ray: usize) -> Option<Term> {
-        let first = self.parts().filter_map(|part| part.terms(ray).next());
+        let first = self.parts().filter_map(|part| part.first(ray));
         let largest = first.reduce(|a, b| if b.order().is_larger_than(a.order()) { b } else { a })?;
         largest.order().is_larger_than(self.end()).then_some(largest)
     }
 
+    fn limit(&self, ray: usize) -> Limit {
+        match self.first(ray) {
+            _ if self.undefined.open.lane(ray) => Limit::Open,
+            _ if self.undefined.rays.lane(ray) => Limit::Unknown,
+            Some(first) => first.limit(),
+            None if Order::ONE.is_larger_than(self.end()) => Limit::zero(),
+            None => Limit::Open,
+        }
+    }
+
     fn along(&self, ray: usize) -> Series {
-        if self.undefined.lane(ray) {
-            return Series::undefined();
+        if self.undefined.rays.lane(ray) {
+            return if self.undefined.open.lane(ray) { Series::open() } else { Series::undefined() };
         }
         let terms = self.parts().flat_map(|part| part.terms(ray)).collect();
         Series::of(terms, self.end())
     }
 
-    /// Creates the sum of some series, each along some rays; `None` if a number is too large or too small. Terms after
-    /// the last row are not kept.
-    fn from_series(series: &[(Series, Outcomes)], undefined: Outcomes) -> Option<Self> {
+    /// Creates the sum of some series, each along some rays; `None` if a number is too large or too small, or if there
+    /// are too many different powers.
+    fn from_series(series: &[(Series, Outcomes)], undefined: Undefined) -> Option<Self> {
         let end = series.iter().fold(Order::NEVER, |end, (series, _)| end.larger(series.unknown()));
+        let terms = || series.iter().flat_map(|(series, rays)| series.terms().iter().map(move |term| (term, *rays)));
+        let mut orders: Vec<Order> = terms().map(|(term, _)| term.order()).filter(|o| o.is_larger_than(end)).collect();
+        orders.sort_by(|a, b| a.compare(*b));
         let mut firsts: Vec<Order> = Vec::new();
-        for term in series.iter().flat_map(|(series, _)| series.terms()) {
-            match firsts.iter_mut().find(|first| term.order().is_in_steps_from(**first)) {
-                Some(first) => *first = first.larger(term.order()),
-                None => firsts.push(term.order()),
+        for order in orders {
+            if !firsts.iter().any(|&first| order.row_from(first).is_some()) {
+                firsts.push(order);
             }
         }
-        if firsts.len() > MOST_PARTS {
+        if firsts.len() >= MOST_PARTS {
             return None;
         }
-        if firsts.is_empty() {
-            let is_exact = end.compare(Order::NEVER) == Ordering::Equal;
-            return Some(Self::of(if is_exact { Rows::zero() } else { Rows::new(end, &[], false)? }, undefined));
-        }
-        Self::total(firsts.into_iter().map(|first| rows_of(series, first, end)), undefined)
+        let unknown = (end.compare(Order::NEVER) != Ordering::Equal).then(|| Some(Rows::unknown(end)));
+        Self::total(firsts.iter().map(|&first| rows_of(terms(), first, &firsts)).chain(unknown), undefined)
     }
 }
 
-/// Returns the rows of terms in whole steps from one order.
-fn rows_of(series: &[(Series, Outcomes)], first: Order, end: Order) -> Option<Rows> {
-    let known = (0..length()).take_while(|&step| first.after(step).is_larger_than(end)).count();
-    let (mut rows, mut used) = ([Coefficients::ZERO; LENGTHS[0]], 0);
-    let list = &mut rows[..known];
-    let mut is_exact = end.compare(Order::NEVER) == Ordering::Equal;
-    for (series, rays) in series {
-        for term in series.terms().iter().filter(|term| term.order().is_in_steps_from(first)) {
-            let step = (term.order().power - first.power).round() as usize;
-            let Some(row) = list.get_mut(step) else {
-                is_exact = false;
-                continue;
-            };
-            let (factor, size) = term.plain()?;
-            row.set(*rays, factor, size);
-            used = used.max(step + 1);
-        }
+/// Returns the rows of those terms that do not belong to earlier orders than `first`.
+fn rows_of<'a>(terms: impl Iterator<Item = (&'a Term, Outcomes)>, first: Order, firsts: &[Order]) -> Option<Rows> {
+    let (mut rows, mut used) = ([Coefficients::ZERO; MOST_ROWS], 0);
+    let own = |term: &Term| firsts.iter().find(|&&other| term.order().row_from(other).is_some());
+    for (term, rays) in terms.filter(|(term, _)| own(term).is_some_and(|own| own.compare(first) == Ordering::Equal)) {
+        let row = term.order().row_from(first)?;
+        let (factor, size) = term.plain()?;
+        rows[row].set(rays, factor, size);
+        used = used.max(row + 1);
     }
-    Rows::new(first, &list[..if is_exact { used } else { known }], is_exact)
+    Rows::new(first, &rows[..used], true)
 }
 
 /// A number along the rays of a bundle.
@@ -233,37 +318,52 @@ pub(super) enum Bundle {
 
 /// Returns whether long series are asked for. They are kept apart, to lose no term.
 fn is_long() -> bool {
-    length() > LENGTHS[0]
+    length() > MOST_ROWS
 }
 
 impl Bundle {
     /// Creates x + slope · ε along each ray.
     pub(super) fn linear(x: Unbounded<f64>, slopes: &[f64]) -> Self {
-        if slopes.iter().all(|&slope| slope == 0.0) && x.is_finite() {
-            return Self::Same(Series::linear(x, 0.0));
-        }
+        let is_constant = slopes.iter().all(|&slope| slope == 0.0);
         let row = |value: &dyn Fn(usize) -> f64| -> Row {
             std::array::from_fn(|ray| if ray < slopes.len() { value(ray) } else { 0.0 })
         };
-        let rows = || Rows::linear(row(&|_| x.to_scalar()), row(&|ray| slopes[ray]));
+        let constant = || row(&|_| x.to_scalar());
+        let rows = || match is_constant {
+            true => Rows::constant(constant()),
+            false => Rows::linear(constant(), row(&|ray| slopes[ray])),
+        };
         match (x.is_finite() && !is_long()).then(rows).flatten() {
-            Some(rows) => Self::Sum(Sum::of(rows, !Outcomes::first(slopes.len()))),
+            Some(rows) => Self::Sum(Sum::of(rows, Undefined::surely(!Outcomes::first(slopes.len())))),
+            None if is_constant && x.is_finite() => Self::Same(Series::linear(x, 0.0)),
             None => Self::Apart(slopes.iter().map(|&slope| Series::linear(x, slope)).collect()),
         }
     }
 
     pub(super) fn number(value: f64) -> Self {
-        Self::Same(Series::number(value))
+        let all = rays();
+        match (!is_long()).then(|| Rows::same(value, all)).flatten() {
+            Some(rows) => Self::Sum(Sum { part: rows, others: Vec::new(), undefined: Undefined::surely(!all) }),
+            None => Self::Same(Series::number(value)),
+        }
     }
 
     fn of(series: Vec<Series>) -> Self {
         if is_long() {
             return Self::Apart(series);
         }
-        let undefined = Outcomes::of(|ray| series.get(ray).is_none_or(|series| !series.is_defined()));
-        let along = |(ray, series)| (series, Outcomes::of(|other| other == ray));
-        let defined: Vec<_> = series.iter().cloned().enumerate().map(along).filter(|(s, _)| s.is_defined()).collect();
+        let undefined = Undefined {
+            rays: Outcomes::of(|ray| series.get(ray).is_none_or(|series| !series.is_defined())),
+            open: Outcomes::of(|ray| series.get(ray).is_some_and(Series::is_open)),
+        };
+        let with_ray = |(ray, series)| (series, Outcomes::only(ray));
+        let defined: Vec<_> =
+            series.iter().cloned().enumerate().map(with_ray).filter(|(s, _)| s.is_defined()).collect();
         Sum::from_series(&defined, undefined).map_or(Self::Apart(series), Self::Sum)
+    }
+
+    fn along_each(series: impl Fn(usize) -> Series) -> Self {
+        Self::of((0..RAYS.get()).map(series).collect())
     }
 
     /// Returns the number as a sum of rows, unless long series are asked for.
@@ -271,19 +371,8 @@ impl Bundle {
         match self {
             Self::Sum(sum) => Some(Cow::Borrowed(sum)),
             Self::Same(series) if !is_long() && series.is_defined() => {
-                let all = Outcomes::first(RAYS.get());
-                if let [term] = series.terms()
-                    && term.order().compare(Order::ONE) == Ordering::Equal
-                    && series.is_exact()
-                {
-                    let (factor, size) = term.plain()?;
-                    return Some(Cow::Owned(Sum {
-                        part: Rows::same(factor, size, all)?,
-                        others: Vec::new(),
-                        undefined: !all,
-                    }));
-                }
-                Sum::from_series(&[(series.clone(), all)], !all).map(Cow::Owned)
+                let all = rays();
+                Sum::from_series(&[(series.clone(), all)], Undefined::surely(!all)).map(Cow::Owned)
             }
             _ => None,
         }
@@ -307,7 +396,7 @@ impl Bundle {
             }
             Self::Apart(_) => {}
         }
-        Self::of((0..RAYS.get()).map(|ray| of_series(&self.along(ray))).collect())
+        Self::along_each(|ray| of_series(&self.along(ray)))
     }
 
     fn map_two(
@@ -324,7 +413,7 @@ impl Bundle {
         {
             return Self::Sum(found);
         }
-        Self::of((0..RAYS.get()).map(|ray| of_series(&self.along(ray), &other.along(ray))).collect())
+        Self::along_each(|ray| of_series(&self.along(ray), &other.along(ray)))
     }
 
     pub(super) fn plus(&self, other: &Self) -> Self {
@@ -349,10 +438,7 @@ impl Bundle {
     }
 
     pub(super) fn power(&self, exponent: &Self) -> Self {
-        if let Self::Same(series) = exponent
-            && let Some((constant, rest)) = series.finite()
-            && rest.is_zero()
-        {
+        if let Some(constant) = exponent.constant() {
             return self.raised(constant);
         }
         let of_series = |base: &Series, exponent: &Series| match exponent.finite() {
@@ -360,6 +446,15 @@ impl Bundle {
             _ => base.ln().times(exponent).exp(),
         };
         self.map_two(exponent, |_, _| None, of_series)
+    }
+
+    /// Returns the number that it is along all rays.
+    fn constant(&self) -> Option<f64> {
+        match self {
+            Self::Same(series) => series.finite().filter(|(_, rest)| rest.is_zero()).map(|(constant, _)| constant),
+            Self::Sum(sum) => sum.single()?.as_constant(RAYS.get()),
+            Self::Apart(_) => None,
+        }
     }
 
     pub(super) fn exp(&self) -> Self {
@@ -371,11 +466,11 @@ impl Bundle {
     }
 
     pub(super) fn sin(&self) -> Self {
-        self.map(|_| None, |series| series.sin_cos().0)
+        self.map(|sum| sum.sin_cos().map(|[sine, _]| sine), |series| series.sin_cos().0)
     }
 
     pub(super) fn cos(&self) -> Self {
-        self.map(|_| None, |series| series.sin_cos().1)
+        self.map(|sum| sum.sin_cos().map(|[_, cosine]| cosine), |series| series.sin_cos().1)
     }
 
     /// Returns the angle of the points (x, self).
@@ -390,32 +485,33 @@ impl Bundle {
             _ if !negative.any() => self.clone(),
             Self::Sum(sum) => Self::Sum(sum.signed(negative)),
             Self::Same(series) if negative.all() => Self::Same(series.scaled(-1.0)),
-            _ => Self::of((0..RAYS.get()).map(|ray| self.along(ray).scaled(sign(ray))).collect()),
+            _ => Self::along_each(|ray| self.along(ray).scaled(sign(ray))),
         }
     }
 
     pub(super) fn select(outcomes: Outcomes, yes: &Self, no: &Self) -> Self {
-        let rays = RAYS.get();
-        match (0..rays).filter(|&ray| outcomes.lane(ray)).count() {
-            0 => return no.clone(),
-            taken if taken == rays => return yes.clone(),
-            _ => {}
-        }
         if let (Some(yes), Some(no)) = (yes.sum(), no.sum())
             && let Some(found) = Sum::select(outcomes, &yes, &no)
         {
             return Self::Sum(found);
         }
-        let along = |ray: usize| if outcomes.lane(ray) { yes.along(ray) } else { no.along(ray) }.into_owned();
-        Self::of((0..rays).map(along).collect())
+        Self::along_each(|ray| if outcomes.lane(ray) { yes.along(ray) } else { no.along(ray) }.into_owned())
     }
 
     /// Returns whether the number is defined along a ray. It is not along rays beyond the last.
     pub(super) fn is_defined(&self, ray: usize) -> bool {
         match self {
             Self::Same(series) => series.is_defined(),
-            Self::Sum(sum) => !sum.undefined.lane(ray),
+            Self::Sum(sum) => !sum.undefined.rays.lane(ray),
             Self::Apart(series) => series.get(ray).is_some_and(Series::is_defined),
+        }
+    }
+
+    pub(super) fn limit(&self, ray: usize) -> Limit {
+        match self {
+            Self::Same(series) => series.limit(),
+            Self::Sum(sum) => sum.limit(ray),
+            Self::Apart(series) => series[ray].limit(),
         }
     }
 

@@ -1,11 +1,12 @@
 //! Coefficients of one power of ε along several rays, and the series that they make.
 
-use std::ops::{Deref, DerefMut};
+use std::cell::RefCell;
 
+use super::cpu::dispatch;
 use super::level::{Kernel, Level};
 use super::outcomes::{LANES, Outcomes};
 use super::real::Mask;
-use super::series::{CANCELLED, LENGTHS};
+use super::series::CANCELLED;
 
 pub(super) type Row = [f64; LANES];
 
@@ -14,6 +15,7 @@ const SIZES: std::ops::Range<f64> = 1e-120..1e120;
 
 /// The coefficients of one power of ε along all rays.
 #[derive(Clone, Copy, Debug)]
+#[repr(align(64))]
 pub(super) struct Coefficients {
     pub(super) factors: Row,
     /// Sizes of the largest numbers that were added or subtracted on the way: the error is this many roundoffs.
@@ -45,6 +47,14 @@ impl Coefficients {
             self.factors[ray] += a * b;
             let size = larger(a.abs() * y.sizes[ray], times.abs() * x.sizes[ray] * b.abs());
             self.sizes[ray] = larger(self.sizes[ray], size);
+        }
+    }
+
+    /// Adds `times` · coefficient k of the integral of x' y.
+    #[inline(always)]
+    fn add_slope(&mut self, times: f64, k: usize, x: &[Self], y: &[Self]) {
+        for i in 1..x.len().min(k + 1) {
+            self.add_product(times * i as f64 / k as f64, &x[i], &y[k - i]);
         }
     }
 
@@ -80,8 +90,10 @@ impl Coefficients {
 
     #[inline(always)]
     pub(super) fn scale(&mut self, by: f64) {
-        self.factors = self.factors.map(|x| x * by);
-        self.sizes = self.sizes.map(|x| x * by.abs());
+        for ray in 0..LANES {
+            self.factors[ray] *= by;
+            self.sizes[ray] *= by.abs();
+        }
     }
 
     /// Replaces sums that are rounding errors by 0.
@@ -97,7 +109,8 @@ impl Coefficients {
     /// Returns whether all numbers are 0 or of moderate size.
     #[inline(always)]
     pub(super) fn are_moderate(&self) -> bool {
-        let is_moderate = |x: f64| x == 0.0 || SIZES.start < x.abs() && x.abs() < SIZES.end;
+        // Without branches, for vector code.
+        let is_moderate = |x: f64| (x == 0.0) | (SIZES.start < x.abs()) & (x.abs() < SIZES.end);
         let mut all = true;
         for ray in 0..LANES {
             all &= is_moderate(self.factors[ray]) & (self.sizes[ray] < 1e200);
@@ -105,8 +118,13 @@ impl Coefficients {
         all
     }
 
+    #[inline(always)]
     pub(super) fn is_zero(&self) -> bool {
-        self.factors == [0.0; LANES]
+        let mut all = true;
+        for ray in 0..LANES {
+            all &= self.factors[ray] == 0.0;
+        }
+        all
     }
 
     pub(super) fn set(&mut self, rays: Outcomes, factor: f64, size: f64) {
@@ -121,26 +139,37 @@ fn larger(a: f64, b: f64) -> f64 {
     if a < b { b } else { a }
 }
 
-/// How the coefficients of a series are computed, one after the other.
-pub(super) enum Operation<'a> {
+/// How the coefficients of a series are computed, one after the other, from those of others.
+#[derive(Clone, Copy)]
+pub(super) enum Operation<Series> {
     /// a + sign · b, with the numbers of the first coefficients of both.
-    Sum([&'a [Coefficients]; 2], [usize; 2], f64),
-    Product(&'a [Coefficients], &'a [Coefficients]),
-    Quotient(&'a [Coefficients], &'a [Coefficients]),
+    Sum([Series; 2], [usize; 2], f64),
+    Product(Series, Series),
+    Quotient(Series, Series),
     /// A power of a series that begins with 1.
-    Power(&'a [Coefficients], f64),
+    Power(Series, f64),
     /// The logarithm of a series that begins with 1.
-    Logarithm(&'a [Coefficients]),
+    Logarithm(Series),
     /// The exponential function of a series that begins with 0.
-    Exponential(&'a [Coefficients]),
+    Exponential(Series),
 }
 
-pub(super) struct Compute<'a> {
-    pub(super) operation: Operation<'a>,
-    pub(super) rows: &'a mut [Coefficients],
+impl Operation<List> {
+    /// Returns the operation on the coefficients.
+    fn on(self, all: &[Coefficients]) -> Operation<&[Coefficients]> {
+        let rows = |list: List| &all[list.range()];
+        match self {
+            Self::Sum(of, from, sign) => Operation::Sum(of.map(rows), from, sign),
+            Self::Product(a, b) => Operation::Product(rows(a), rows(b)),
+            Self::Quotient(a, b) => Operation::Quotient(rows(a), rows(b)),
+            Self::Power(x, exponent) => Operation::Power(rows(x), exponent),
+            Self::Logarithm(x) => Operation::Logarithm(rows(x)),
+            Self::Exponential(x) => Operation::Exponential(rows(x)),
+        }
+    }
 }
 
-impl Operation<'_> {
+impl Operation<&[Coefficients]> {
     /// Returns coefficient k before rounding errors are dropped. `before` are those with smaller numbers.
     #[inline(always)]
     fn coefficient(&self, k: usize, before: &[Coefficients]) -> Coefficients {
@@ -152,22 +181,21 @@ impl Operation<'_> {
                 row.add(sign, &k.checked_sub(from_b).map_or(Coefficients::ZERO, |k| at(b, k)));
             }
             Self::Product(a, b) => {
-                for i in (k + 1).saturating_sub(b.len())..a.len().min(k + 1) {
-                    row.add_product(1.0, &a[i], &b[k - i]);
+                let from = (k + 1).saturating_sub(b.len());
+                for (x, y) in a.iter().skip(from).zip(b[..=k - from].iter().rev()) {
+                    row.add_product(1.0, x, y);
                 }
             }
             Self::Quotient(a, b) => {
                 row = at(a, k);
-                for i in 1..b.len().min(k + 1) {
-                    row.add_product(-1.0, &b[i], &before[k - i]);
+                for (x, y) in b.iter().skip(1).zip(before.iter().rev()) {
+                    row.add_product(-1.0, x, y);
                 }
             }
-            Self::Power(x, _) | Self::Logarithm(x) | Self::Exponential(x) if k == 0 => match self {
-                Self::Power(..) => row = x[0],
-                Self::Logarithm(_) => {}
-                _ => row = Coefficients::exact([1.0; LANES]),
-            },
             // The derivatives of y = xᵖ, ln x and eˣ by ε: x y' = p x' y, x y' = x', y' = x' y.
+            Self::Power(x, _) if k == 0 => row = x[0],
+            Self::Logarithm(_) if k == 0 => {}
+            Self::Exponential(_) if k == 0 => row = Coefficients::exact([1.0; LANES]),
             Self::Power(x, exponent) => {
                 for i in 1..x.len().min(k + 1) {
                     row.add_product((exponent * i as f64 - (k - i) as f64) / k as f64, &x[i], &before[k - i]);
@@ -179,22 +207,23 @@ impl Operation<'_> {
                     row.add_product(-((k - i) as f64) / k as f64, &x[i], &before[k - i]);
                 }
             }
-            Self::Exponential(x) => {
-                for i in 1..x.len().min(k + 1) {
-                    row.add_product(i as f64 / k as f64, &x[i], &before[k - i]);
-                }
-            }
+            Self::Exponential(x) => row.add_slope(1.0, k, x, before),
         }
         row
     }
 }
 
+/// Computes coefficients.
+struct Compute<'a> {
+    operation: Operation<&'a [Coefficients]>,
+    rows: &'a mut [Coefficients],
+}
+
 impl Kernel for Compute<'_> {
-    /// Whether all numbers are 0 or of moderate size.
-    type Output = bool;
+    type Output = Extent;
 
     #[inline(always)]
-    fn run<L: Level>(self) -> bool {
+    fn run<L: Level>(self) -> Extent {
         for k in 0..self.rows.len() {
             let mut row = self.operation.coefficient(k, &self.rows[..k]);
             row.drop_cancelled();
@@ -203,43 +232,147 @@ impl Kernel for Compute<'_> {
             }
             self.rows[k] = row;
         }
-        self.rows.iter().fold(true, |all, row| all & row.are_moderate())
+        Extent::of(self.rows)
     }
 }
 
-/// The first coefficients of a series.
+/// Computes the sine and then the cosine of a series x that begins with 0: s' = x' c, c' = −x' s.
+struct SineCosine<'a> {
+    x: &'a [Coefficients],
+    rows: &'a mut [Coefficients],
+}
+
+impl Kernel for SineCosine<'_> {
+    type Output = Extent;
+
+    #[inline(always)]
+    fn run<L: Level>(self) -> Extent {
+        let (sine, cosine) = self.rows.split_at_mut(self.rows.len() / 2);
+        for k in 0..sine.len() {
+            let mut next = [Coefficients::ZERO, Coefficients::exact([if k == 0 { 1.0 } else { 0.0 }; LANES])];
+            next[0].add_slope(1.0, k, self.x, cosine);
+            next[1].add_slope(-1.0, k, self.x, sine);
+            next.iter_mut().for_each(Coefficients::drop_cancelled);
+            [sine[k], cosine[k]] = next;
+        }
+        Extent::of(self.rows)
+    }
+}
+
+/// What is known of coefficients.
+#[derive(Clone, Copy)]
+struct Extent {
+    /// Whether all numbers are 0 or of moderate size.
+    are_moderate: bool,
+    /// How many of the first coefficients are 0.
+    zeros: usize,
+}
+
+impl Extent {
+    #[inline(always)]
+    fn of(rows: &[Coefficients]) -> Self {
+        let mut extent = Self { are_moderate: true, zeros: 0 };
+        for (k, row) in rows.iter().enumerate() {
+            extent.are_moderate &= row.are_moderate();
+            extent.zeros += usize::from(extent.zeros == k && row.is_zero());
+        }
+        extent
+    }
+}
+
+thread_local! {
+    /// The coefficients of all series of the bundle that this thread is computing.
+    static COEFFICIENTS: RefCell<Vec<Coefficients>> = const { RefCell::new(Vec::new()) };
+}
+
+/// The first coefficients of a series: a handle. They do not change, and are forgotten after each bundle.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct List {
-    rows: [Coefficients; LENGTHS[0]],
-    count: usize,
+    start: u32,
+    count: u32,
 }
 
 impl List {
-    pub(super) fn zeros(count: usize) -> Self {
-        Self { rows: [Coefficients::ZERO; LENGTHS[0]], count }
+    pub(super) const EMPTY: Self = Self { start: 0, count: 0 };
+
+    pub(super) fn forget_all() {
+        COEFFICIENTS.with_borrow_mut(Vec::clear);
     }
 
     pub(super) fn of(rows: &[Coefficients]) -> Self {
-        let mut list = Self::zeros(rows.len());
-        list.copy_from_slice(rows);
-        list
+        Self::filled(rows.len(), |_, new| new.copy_from_slice(rows)).0
     }
 
-    pub(super) fn drop_first(&mut self, count: usize) {
-        self.rows.copy_within(count..self.count, 0);
-        self.count -= count;
+    /// Computes coefficients and drops the first ones that are 0. Returns also how many these are; `None` if a number is
+    /// too large or too small.
+    pub(super) fn computed(count: usize, operation: Operation<Self>) -> Option<(Self, usize)> {
+        let (list, extent) = Self::filled(count, |all, rows| dispatch(Compute { operation: operation.on(all), rows }));
+        extent.are_moderate.then(|| (list.after(extent.zeros), extent.zeros))
     }
-}
 
-impl Deref for List {
-    type Target = [Coefficients];
-    fn deref(&self) -> &[Coefficients] {
-        &self.rows[..self.count]
+    /// Returns sine and cosine of a series that begins with 0.
+    pub(super) fn sine_cosine(self, count: usize) -> Option<[Self; 2]> {
+        let compute =
+            |all: &[Coefficients], rows: &mut [Coefficients]| dispatch(SineCosine { x: &all[self.range()], rows });
+        let (both, Extent { are_moderate, .. }) = Self::filled(2 * count, compute);
+        let sine = Self { count: both.count / 2, ..both };
+        are_moderate.then(|| [sine, both.after(count)])
     }
-}
 
-impl DerefMut for List {
-    fn deref_mut(&mut self) -> &mut [Coefficients] {
-        &mut self.rows[..self.count]
+    /// Creates coefficients from those that exist.
+    fn filled<R>(count: usize, fill: impl FnOnce(&[Coefficients], &mut [Coefficients]) -> R) -> (Self, R) {
+        COEFFICIENTS.with_borrow_mut(|all| {
+            let start = all.len();
+            all.resize(start + count, Coefficients::ZERO);
+            let (others, rows) = all.split_at_mut(start);
+            let found = fill(others, rows);
+            let [start, count] = [start, count].map(|n| u32::try_from(n).expect("fewer than 2³² coefficients"));
+            (Self { start, count }, found)
+        })
+    }
+
+    fn range(self) -> std::ops::Range<usize> {
+        self.start as usize..(self.start + self.count) as usize
+    }
+
+    pub(super) fn len(self) -> usize {
+        self.count as usize
+    }
+
+    pub(super) fn is_empty(self) -> bool {
+        self.count == 0
+    }
+
+    pub(super) fn with<R>(self, read: impl FnOnce(&[Coefficients]) -> R) -> R {
+        COEFFICIENTS.with_borrow(|all| read(&all[self.range()]))
+    }
+
+    pub(super) fn first(self) -> Option<Coefficients> {
+        self.with(|rows| rows.first().copied())
+    }
+
+    /// Returns the coefficients without the first ones that are 0, and how many these are.
+    pub(super) fn stripped(self) -> (Self, usize) {
+        let zeros = self.with(|rows| rows.iter().take_while(|row| row.is_zero()).count());
+        (self.after(zeros), zeros)
+    }
+
+    fn after(self, first: usize) -> Self {
+        let first = first as u32;
+        Self { start: self.start + first, count: self.count - first }
+    }
+
+    /// Returns the first coefficient and the others.
+    pub(super) fn split(self) -> [Self; 2] {
+        [Self { count: 1, ..self }, self.after(1)]
+    }
+
+    /// Returns coefficients that `change` was applied to, with their numbers.
+    pub(super) fn changed(self, change: impl Fn(usize, &mut Coefficients)) -> Self {
+        let copy = |all: &[Coefficients], rows: &mut [Coefficients]| {
+            rows.copy_from_slice(&all[self.range()]);
+            rows.iter_mut().enumerate().for_each(|(k, row)| change(k, row));
+        };
+        Self::filled(self.len(), copy).0
     }
 }

@@ -6,8 +6,8 @@
 use std::ops::Range;
 
 use super::flags::{Flag, Flags};
-use super::narrow::{Evaluated, Search, one_sided};
-use super::ray::{Along, Comparison, Found, Ray};
+use super::narrow::{EVALUATIONS, Evaluated, Search, one_sided};
+use super::ray::{Along, Comparison, Found, Singular};
 use super::real::{Mask, Number};
 use super::series::Limit;
 use super::unbounded::Unbounded;
@@ -44,6 +44,8 @@ const FEW: usize = 8;
 const SOME: usize = 16;
 /// The fewest of them that must have results, which other rays may not have: they leave the formula's domain.
 const ENOUGH: usize = 5;
+/// Numbers with a relative error of fewer roundoffs are surely different if they differ by 1e-8.
+const SURE: f64 = 1e5;
 /// Rays that tell a kink, where derivatives have some values, from a singularity.
 const MANY: usize = 24;
 
@@ -126,11 +128,15 @@ fn look_around<T: Number>(inputs: &[T], roles: Roles<'_>, results: &mut [T], fla
 struct Path {
     slopes: Vec<f64>,
     comparisons: Vec<Comparison>,
-    /// Limits of all results.
+    /// Limits of the first results. Others are unknown.
     limits: Vec<Limit>,
 }
 
 impl Path {
+    fn limit(&self, result: usize) -> Limit {
+        self.limits.get(result).copied().unwrap_or(Limit::Unknown)
+    }
+
     fn evaluated(&self) -> Evaluated<'_> {
         let Self { slopes, comparisons, .. } = self;
         Evaluated { slopes, comparisons }
@@ -143,6 +149,10 @@ struct Rays<'a> {
     roles: Roles<'a>,
     rounding: Rounding,
     along: Along<'a>,
+    /// Indices of the results of each group.
+    ranges: Vec<Range<usize>>,
+    /// Groups that all rays have results of. If the last of them has no limit, later ones, its derivatives, have none.
+    evaluated: usize,
     paths: Vec<Path>,
     /// Whether all values are undefined along all rays, as those of √(−1).
     is_outside: bool,
@@ -172,6 +182,10 @@ impl Group<'_> {
     fn all(&self, is: impl Fn(&Agreement) -> bool) -> bool {
         self.agreements.iter().all(is)
     }
+
+    fn has_limits(&self) -> bool {
+        self.all(|a| matches!(a, Agreement::Number(_)))
+    }
 }
 
 fn zero() -> Unbounded<f64> {
@@ -180,7 +194,17 @@ fn zero() -> Unbounded<f64> {
 
 impl<'a> Rays<'a> {
     fn through(inputs: Vec<Unbounded<f64>>, roles: Roles<'a>, rounding: Rounding, along: Along<'a>) -> Self {
-        Self { inputs, roles, rounding, along, paths: Vec::new(), is_outside: true }
+        let mut end = 0;
+        let range = |&size: &usize| {
+            end += size;
+            end - size..end
+        };
+        let ranges: Vec<_> = roles.groups.iter().map(range).collect();
+        Self { inputs, roles, rounding, along, evaluated: ranges.len(), ranges, paths: Vec::new(), is_outside: true }
+    }
+
+    fn routine(&self) -> Singular<'_> {
+        Singular { inputs: &self.inputs, along: self.along, groups: &self.ranges }
     }
 
     /// Evaluates more rays, up to this number.
@@ -194,103 +218,120 @@ impl<'a> Rays<'a> {
     }
 
     fn cast_along(&mut self, slopes: Vec<Vec<f64>>) {
-        let Roles { groups, values_first, .. } = self.roles;
-        let values = if values_first { groups[0] } else { 0 };
-        let is_inside = |limits: &Vec<Limit>| !limits[..values].iter().any(|value| matches!(value, Limit::Unknown));
-        let found = Ray::evaluate(&self.inputs, &slopes, self.along);
-        for (slopes, Found { limits, comparisons }) in slopes.into_iter().zip(found) {
-            self.is_outside &= limits.as_ref().is_some_and(|limits| !is_inside(limits));
-            // If the value is undefined, so are its derivatives.
-            let limits = limits.filter(is_inside).unwrap_or_else(|| vec![Limit::Unknown; groups.iter().sum()]);
-            self.paths.push(Path { slopes, comparisons, limits });
-        }
-    }
-
-    fn agree(&self) -> bool {
-        let mut groups = self.groups().into_iter().zip(self.scales());
-        groups.all(|(group, scale)| group.into_iter().all(|i| matches!(self.agreement(i, scale), Agreement::Number(_))))
-    }
-
-    /// Returns whether every group has limits, or a result that each ray has its own number or infinity for.
-    fn are_scattered(&self) -> bool {
-        self.groups().into_iter().zip(self.scales()).all(|(group, scale)| {
-            let agreements: Vec<Agreement> = group.clone().map(|i| self.agreement(i, scale)).collect();
-            let has_limits = agreements.iter().all(|a| matches!(a, Agreement::Number(_)));
-            has_limits || group.into_iter().any(|i| self.is_scattered(i, scale))
-        })
-    }
-
-    fn is_scattered(&self, result: usize, scale: Unbounded<f64>) -> bool {
-        let is_infinite = |path: &Path| matches!(path.limits[result], Limit::Infinite(_));
-        let (numbers, sides) = (self.numbers(result).count(), self.sides(result, scale).len());
-        // An even function has one result for two opposite directions: twelve different ones for sixteen rays.
-        self.paths.iter().any(is_infinite) || numbers >= ENOUGH && 3 * sides >= 2 * numbers
-    }
-
-    /// Returns the different limits of a result.
-    fn sides(&self, result: usize, scale: Unbounded<f64>) -> Vec<Unbounded<f64>> {
-        let mut sides: Vec<Unbounded<f64>> = Vec::new();
-        for number in self.numbers(result) {
-            if !sides.iter().any(|side| is_near(*side, number, scale)) {
-                sides.push(number);
+        for slopes in slopes.chunks(FEW) {
+            let mut evaluated = self.evaluated;
+            let found = self.routine().evaluate(slopes, &mut |group, found| {
+                let is_last = self.has_surely_no_limit(group, found);
+                evaluated = if is_last { evaluated.min(group + 1) } else { evaluated };
+                !is_last
+            });
+            self.evaluated = evaluated;
+            for (slopes, Found { limits, comparisons }) in slopes.iter().zip(found) {
+                self.is_outside &= limits.as_ref().is_some_and(|limits| !self.is_inside(limits));
+                // If the value is undefined, so are its derivatives.
+                let limits = limits.filter(|limits| self.is_inside(limits)).unwrap_or_default();
+                self.paths.push(Path { slopes: slopes.clone(), comparisons, limits });
             }
         }
-        sides
     }
 
-    /// Looks for rays into narrow regions where the formula takes another branch, with other results.
-    fn cast_into_narrow_regions(&mut self) {
+    /// Returns whether all values are defined along a ray.
+    fn is_inside(&self, limits: &[Limit]) -> bool {
+        let values = if self.roles.values_first { self.ranges[0].len() } else { 0 };
+        !limits[..values].iter().any(|value| matches!(value, Limit::Unknown | Limit::Open))
+    }
+
+    /// Returns whether a result of this group is infinite along a ray, or has a number of its own on each ray that is
+    /// more than rounding; or whether no ray is inside of the domain.
+    fn has_surely_no_limit(&self, group: usize, found: &[Found]) -> bool {
+        let rays = || found.iter().filter_map(|ray| ray.limits.as_deref()).filter(|limits| self.is_inside(limits));
+        rays().next().is_none()
+            || self.ranges[group].clone().any(|i| {
+                let known = |limits: &[Limit]| match limits[i] {
+                    Limit::Finite(number, doubt) => (doubt < SURE).then_some(number),
+                    _ => None,
+                };
+                let numbers: Vec<_> = rays().filter_map(known).collect();
+                let scale = numbers.iter().fold(zero(), |scale, number| scale.max(number.abs()));
+                let numbers: Vec<f64> = numbers.into_iter().map(|number| relative(number, scale)).collect();
+                rays().any(|limits| matches!(limits[i], Limit::Infinite(_))) || are_scattered(&numbers)
+            })
+    }
+
+    /// Judges the limits of all results.
+    fn judged<'b>(&self, plain: &'b [Unbounded<f64>]) -> Vec<Group<'b>> {
+        let group = |(range, scale): (Range<usize>, Unbounded<f64>)| Group {
+            agreements: range.clone().map(|i| self.agreement(i, scale)).collect(),
+            plain: &plain[range.clone()],
+            range,
+            scale,
+        };
+        self.ranges.iter().cloned().zip(self.scales()).map(group).collect()
+    }
+
+    /// Returns whether a group has limits, or a result that each ray has its own number or infinity for.
+    fn is_scattered(&self, group: &Group<'_>) -> bool {
+        let is_infinite = |i: usize| self.paths.iter().any(|path| matches!(path.limit(i), Limit::Infinite(_)));
+        let is_scattered = |i: usize| is_infinite(i) || are_scattered(&self.relative(i, group.scale));
+        group.has_limits() || group.range.clone().any(is_scattered)
+    }
+
+    /// Looks for rays into narrow regions where the formula takes another branch, with other results than those of these
+    /// groups. Returns whether there are any.
+    fn cast_into_narrow_regions(&mut self, groups: &[Group<'_>]) -> bool {
         let rays: Vec<Evaluated<'_>> = self.paths.iter().map(Path::evaluated).collect();
-        let (inputs, moves) = (&self.inputs[..], self.roles.moves);
-        let differ = |found: Vec<Found>| found.into_iter().map(|ray| !self.has_results(ray.limits)).collect::<Vec<_>>();
+        let (routine, moves) = (self.routine(), self.roles.moves);
+        let differs = |ray: Found| !self.has_results(ray.limits, groups);
         let comparisons = one_sided(&rays);
-        let matter = differ(Ray::evaluate_reversed(&comparisons, inputs, &self.paths[0].slopes, self.along));
-        let mut important = comparisons.iter().zip(matter).filter(|(_, matters)| *matters);
-        let found = important.find_map(|(comparisons, _)| {
-            let found = Search { inputs, moves, along: self.along, comparison: comparisons[0] }.run(&rays);
-            differ(Ray::evaluate(inputs, &found, self.along)).contains(&true).then_some(found)
+        let reversed = routine.evaluate_reversed(&comparisons, &self.paths[0].slopes);
+        let important = comparisons.iter().zip(reversed).filter_map(|(list, ray)| differs(ray).then_some(list[0]));
+        let important: Vec<usize> = important.collect();
+        let evaluations = EVALUATIONS / important.len().max(1);
+        let found = important.into_iter().find_map(|comparison| {
+            let found = Search { routine, moves, comparison, evaluations }.run(&rays);
+            routine.evaluate(&found, &mut |_, _| true).into_iter().any(differs).then_some(found)
         });
-        if let Some(found) = found {
-            self.cast(MANY);
-            self.cast_along(found);
-        }
+        let Some(found) = found else { return false };
+        self.cast(MANY);
+        self.cast_along(found);
+        true
     }
 
     /// Returns whether limits are those of the first ray, or do not exist because the formula is degenerate.
-    fn has_results(&self, limits: Option<Vec<Limit>>) -> bool {
-        let first = &self.paths[0].limits;
-        let same = |a: &Limit, b: &Limit, scale| match (a, b) {
-            (Limit::Finite(a), Limit::Finite(b)) => is_near(*a, *b, scale),
+    fn has_results(&self, limits: Option<Vec<Limit>>, groups: &[Group<'_>]) -> bool {
+        let same = |a: Limit, b: Limit, scale| match (a, b) {
+            (Limit::Finite(a, _), Limit::Finite(b, _)) => is_near(relative(a, scale), relative(b, scale)),
             _ => false,
         };
         limits.is_none_or(|limits| {
-            let mut groups = self.groups().into_iter().zip(self.scales());
-            groups.all(|(group, scale)| group.into_iter().all(|i| same(&limits[i], &first[i], scale)))
+            groups.iter().all(|group| group.range.clone().all(|i| same(limits[i], self.paths[0].limit(i), group.scale)))
         })
     }
 
     fn settle<T: Number>(mut self, plain: &[Unbounded<f64>], flags: &mut Flags<T>) -> Vec<Unbounded<f64>> {
         self.cast(FEW);
-        if self.agree() {
-            self.cast_into_narrow_regions();
+        let mut groups = self.judged(plain);
+        if groups.iter().all(Group::has_limits) {
+            if self.cast_into_narrow_regions(&groups) {
+                groups = self.judged(plain);
+            }
         } else {
             for rays in [SOME, MANY] {
-                if self.are_scattered() {
+                if groups[..self.evaluated].iter().all(|group| self.is_scattered(group)) {
                     break;
                 }
                 self.cast(rays);
+                groups = self.judged(plain);
             }
         }
         let mut settled = Vec::with_capacity(plain.len());
-        for (number, (range, scale)) in self.groups().into_iter().zip(self.scales()).enumerate() {
-            let group = Group {
-                agreements: range.clone().map(|i| self.agreement(i, scale)).collect(),
-                plain: &plain[range.clone()],
-                range,
-                scale,
-            };
+        for (number, group) in groups.into_iter().enumerate() {
             let is_value = number == 0 && self.roles.values_first;
-            let (numbers, flag) = if is_value { self.values(&group) } else { self.derivatives(&group) };
+            let (numbers, flag) = match () {
+                () if number >= self.evaluated => self.conventions(&group),
+                () if is_value => self.values(&group),
+                () => self.derivatives(&group),
+            };
             settled.extend(numbers);
             match flag {
                 Some(Flag::Degenerate) => flags.degenerate = !T::Mask::none(),
@@ -310,7 +351,7 @@ impl<'a> Rays<'a> {
             _ if plain.is_finite() && !self.is_outside => plain,
             _ => zero(),
         };
-        let has_limits = group.all(|a| matches!(a, Agreement::Number(_)));
+        let has_limits = group.has_limits();
         let is_single = group.plain.len() == 1 || !self.inputs.iter().all(|input| input.is_finite());
         if !has_limits && !is_single {
             return self.conventions(group);
@@ -331,9 +372,9 @@ impl<'a> Rays<'a> {
         if !group.all(|a| matches!(a, Agreement::Number(_) | Agreement::Sides)) {
             return self.conventions(group);
         }
-        let side = &self.paths[self.side(group)].limits;
-        let limit = |(agreement, i): (&Agreement, usize)| match (agreement, side[i]) {
-            (&Agreement::Number(limit), _) | (_, Limit::Finite(limit)) => limit,
+        let side = &self.paths[self.side(group)];
+        let limit = |(agreement, i): (&Agreement, usize)| match (agreement, side.limit(i)) {
+            (&Agreement::Number(limit), _) | (_, Limit::Finite(limit, _)) => limit,
             _ => zero(),
         };
         let limits = group.agreements.iter().zip(group.range.clone()).map(limit);
@@ -343,20 +384,15 @@ impl<'a> Rays<'a> {
     }
 
     fn numbers(&self, result: usize) -> impl Iterator<Item = Unbounded<f64>> {
-        self.paths.iter().filter_map(move |path| match path.limits[result] {
-            Limit::Finite(number) => Some(number),
+        self.paths.iter().filter_map(move |path| match path.limit(result) {
+            Limit::Finite(number, _) => Some(number),
             _ => None,
         })
     }
 
-    /// Returns the indices of the results of each group.
-    fn groups(&self) -> Vec<Range<usize>> {
-        let mut end = 0;
-        let range = |&size: &usize| {
-            end += size;
-            end - size..end
-        };
-        self.roles.groups.iter().map(range).collect()
+    /// Returns the finite limits of a result, relative to a scale.
+    fn relative(&self, result: usize, scale: Unbounded<f64>) -> Vec<f64> {
+        self.numbers(result).map(|number| relative(number, scale)).collect()
     }
 
     /// Returns the size of each group, which its rounding errors are relative to: its largest limit, or the contribution
@@ -366,7 +402,7 @@ impl<'a> Rays<'a> {
         let moving = self.inputs.iter().zip(self.roles.moves).filter(|(input, moves)| **moves && input.is_finite());
         let distance = largest(&mut moving.map(|(&input, _)| input));
         let mut scales: Vec<_> =
-            self.groups().into_iter().map(|group| largest(&mut group.flat_map(|i| self.numbers(i)))).collect();
+            self.ranges.iter().map(|group| largest(&mut group.clone().flat_map(|i| self.numbers(i)))).collect();
         for group in (1..scales.len()).rev() {
             scales[group - 1] = scales[group - 1].max(scales[group] * distance);
         }
@@ -375,20 +411,15 @@ impl<'a> Rays<'a> {
 
     /// Rays on which a result is not defined do not count: they leave its domain.
     fn agreement(&self, result: usize, scale: Unbounded<f64>) -> Agreement {
-        let numbers: Vec<_> = self.numbers(result).collect();
-        let infinite = self.paths.iter().filter_map(|path| match path.limits[result] {
+        let numbers = self.relative(result, scale);
+        let mut infinite = self.paths.iter().filter_map(|path| match path.limit(result) {
             Limit::Infinite(sign) => Some(sign),
             _ => None,
         });
-        let infinite: Vec<f64> = infinite.collect();
-        match (&numbers[..], &infinite[..]) {
-            ([], []) => Agreement::None,
-            ([], [first, rest @ ..]) if rest.iter().all(|other| other == first) => Agreement::Infinite(*first),
-            ([first, rest @ ..], []) if rest.iter().all(|x| is_near(*x, *first, scale)) => Agreement::Number(*first),
-            (numbers, []) => {
-                let sides = self.sides(result, scale);
-                if 2 * sides.len() <= numbers.len() { Agreement::Sides } else { Agreement::None }
-            }
+        match (self.numbers(result).next(), infinite.next()) {
+            (None, Some(first)) if infinite.all(|other| other == first) => Agreement::Infinite(first),
+            (Some(first), None) if numbers.iter().all(|&x| is_near(x, numbers[0])) => Agreement::Number(first),
+            (Some(_), None) if 2 * sides(&numbers) <= numbers.len() => Agreement::Sides,
             _ => Agreement::None,
         }
     }
@@ -396,11 +427,11 @@ impl<'a> Rays<'a> {
     /// Returns the ray whose limits are the most like the plain results: the side on which the formula itself is.
     fn side(&self, group: &Group<'_>) -> usize {
         let alike = |ray: usize| {
-            let same = |(limit, plain): (&Limit, &Unbounded<f64>)| match limit {
-                Limit::Finite(number) => is_near(*number, *plain, group.scale),
+            let same = |(i, &plain): (usize, &Unbounded<f64>)| match self.paths[ray].limit(i) {
+                Limit::Finite(number, _) => is_near(relative(number, group.scale), relative(plain, group.scale)),
                 _ => false,
             };
-            self.paths[ray].limits[group.range.clone()].iter().zip(group.plain).filter(|pair| same(*pair)).count()
+            group.range.clone().zip(group.plain).filter(|&pair| same(pair)).count()
         };
         (0..self.paths.len()).rev().max_by_key(|&ray| alike(ray)).unwrap_or(0)
     }
@@ -423,9 +454,26 @@ impl Rounding {
     }
 }
 
-fn is_near(a: Unbounded<f64>, b: Unbounded<f64>, scale: Unbounded<f64>) -> bool {
-    let allowed = Unbounded::from_f64(1e-8) * a.abs().max(b.abs()) + Unbounded::from_f64(1e-13) * scale;
-    (a - b).abs().less_or_equal(allowed)
+/// Returns a number relative to the scale of its group.
+fn relative(x: Unbounded<f64>, scale: Unbounded<f64>) -> f64 {
+    if x.equal(zero()) { 0.0 } else { (x / scale).to_scalar() }
+}
+
+/// Returns whether numbers are equal but for rounding errors.
+fn is_near(a: f64, b: f64) -> bool {
+    (a - b).abs() < 1e-8 * a.abs().max(b.abs()) + 1e-13
+}
+
+/// Returns whether each ray has its own number. An even function has one for two opposite directions: twelve different
+/// ones for sixteen rays.
+fn are_scattered(numbers: &[f64]) -> bool {
+    numbers.len() >= ENOUGH && 3 * sides(numbers) >= 2 * numbers.len()
+}
+
+/// Returns how many of these numbers are different.
+fn sides(numbers: &[f64]) -> usize {
+    let is_new = |(i, &number): (usize, &f64)| !numbers[..i].iter().any(|&other| is_near(other, number));
+    numbers.iter().enumerate().filter(|&number| is_new(number)).count()
 }
 
 /// Returns the slope of an input along a ray: a fixed number of size ¼ to 1. Only the first rays are opposite: an even
@@ -446,6 +494,7 @@ mod tests {
     use super::*;
     use crate::numbers::level::Baseline;
     use crate::numbers::outcomes::Outcomes;
+    use crate::numbers::ray::Ray;
 
     type Formula = fn(&[Ray]) -> Vec<Ray>;
 

@@ -15,6 +15,7 @@ mod narrow;
 mod outcomes;
 mod ray;
 mod real;
+mod recording;
 mod rows;
 mod series;
 mod unbounded;

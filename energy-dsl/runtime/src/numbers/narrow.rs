@@ -7,12 +7,11 @@
 use std::cmp::Ordering;
 
 use super::outcomes::LANES;
-use super::ray::{Along, Comparison, Ray};
+use super::ray::{Comparison, Singular};
 use super::series::Term;
-use super::unbounded::Unbounded;
 
-/// Rays that one descent may evaluate. Forty coordinates need about as many.
-const EVALUATIONS: usize = 400;
+/// Rays that the descents at one input may evaluate. Forty coordinates need 400 for one descent.
+pub(super) const EVALUATIONS: usize = 800;
 /// Descents start from the rays with the smallest differences.
 const STARTS: usize = 2;
 /// Narrower cones, in slopes, are not searched for.
@@ -56,11 +55,12 @@ pub(super) fn one_sided(rays: &[Evaluated<'_>]) -> Vec<Vec<usize>> {
 
 /// A search for rays on which a comparison has another outcome.
 pub(super) struct Search<'a> {
-    pub inputs: &'a [Unbounded<f64>],
+    pub routine: Singular<'a>,
     pub moves: &'a [bool],
-    pub along: Along<'a>,
     /// Number of the comparison.
     pub comparison: usize,
+    /// Rays that may be evaluated.
+    pub evaluations: usize,
 }
 
 /// Slopes and the difference along them.
@@ -103,7 +103,7 @@ impl Search<'_> {
     }
 
     fn at_each(&self, rays: Vec<Vec<f64>>) -> Vec<Point> {
-        let comparisons = Ray::compare(self.inputs, &rays, self.along);
+        let comparisons = self.routine.compare(&rays);
         let point = |(slopes, comparisons): (Vec<f64>, Vec<Comparison>)| Point {
             difference: comparisons.get(self.comparison).copied().flatten(),
             slopes,
@@ -121,7 +121,7 @@ impl Search<'_> {
         let mut best = start;
         let mut steps: Vec<(usize, f64)> = self.moving().map(|i| (i, 0.5)).collect();
         let mut evaluations = 0;
-        while evaluations < EVALUATIONS && steps.iter().any(|&(_, step)| step.abs() > NARROWEST) {
+        while evaluations < self.evaluations / STARTS && steps.iter().any(|&(_, step)| step.abs() > NARROWEST) {
             let before = best.slopes.clone();
             for steps in steps.chunks_mut(LANES / 2) {
                 let tried = self.at_each(steps.iter().flat_map(|&(i, step)| beside(&best.slopes, i, step)).collect());
@@ -200,8 +200,9 @@ fn is_smaller(a: &Point, b: &Point) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
     use crate::numbers::outcomes::Outcomes;
+    use crate::numbers::ray::Ray;
+    use crate::numbers::unbounded::Unbounded;
     use crate::numbers::{Care, Flags, Mask, Number, Roles, settle};
 
     /// Returns whether a value with one derivative is marked as a kink at 0, where the derivative is 1.

@@ -12,6 +12,13 @@ pub(super) const LANES: usize = 8;
 pub struct Outcomes(u8);
 
 impl Outcomes {
+    pub(super) const NONE: Self = Self(0);
+
+    /// Creates the mask of one ray.
+    pub(super) fn only(ray: usize) -> Self {
+        Self(1 << ray)
+    }
+
     /// Creates the mask of the first rays.
     pub(super) fn first(rays: usize) -> Self {
         Self(((1_u32 << rays) - 1).to_le_bytes()[0])
@@ -45,7 +52,7 @@ impl Not for Outcomes {
 
 impl Mask for Outcomes {
     fn none() -> Self {
-        Self(0)
+        Self::NONE
     }
     fn bits(self) -> u32 {
         self.0.into()

@@ -11,22 +11,23 @@ use super::unbounded::Unbounded;
 type Factor = Unbounded<f64>;
 
 /// Terms that a series keeps at first, and if these do not determine a limit.
-pub(super) const LENGTHS: [usize; 2] = [3, 10];
+pub(super) const LENGTHS: [usize; 3] = [3, MOST_ROWS, LONGEST];
+/// The most terms of series that are kept as rows.
+pub(super) const MOST_ROWS: usize = 6;
+/// The most terms of a series. Longer series lose terms of other powers.
+const LONGEST: usize = 10;
 
 thread_local! {
     /// Terms that a series keeps.
-    static LENGTH: Cell<usize> = const { Cell::new(LENGTHS[1]) };
-    /// Whether a result is unknown because all known terms of a series cancelled.
-    static IS_SHORT: Cell<bool> = const { Cell::new(false) };
+    static LENGTH: Cell<usize> = const { Cell::new(LONGEST) };
 }
 
-/// Evaluates with series of at most this many terms. Returns also whether more terms might tell more.
-pub(super) fn with_length<R>(length: usize, evaluate: impl FnOnce() -> R) -> (R, bool) {
+/// Evaluates with series of at most this many terms.
+pub(super) fn with_length<R>(length: usize, evaluate: impl FnOnce() -> R) -> R {
     LENGTH.set(length);
-    IS_SHORT.set(false);
     let result = evaluate();
-    LENGTH.set(LENGTHS[1]);
-    (result, IS_SHORT.get())
+    LENGTH.set(LONGEST);
+    result
 }
 
 /// Returns the number of terms that a series keeps.
@@ -54,8 +55,10 @@ impl Order {
     pub(super) const ONE: Self = Self { power: 0.0, logs: 0.0 };
     /// Smaller than everything: the first unknown term of an exact series.
     pub(super) const NEVER: Self = Self { power: f64::INFINITY, logs: 0.0 };
-    /// Larger than everything: of such a series nothing is known.
+    /// Larger than everything: of such a series nothing is known, because it has too few terms.
     const ALWAYS: Self = Self { power: f64::NEG_INFINITY, logs: 0.0 };
+    /// Larger still: such a series does not exist.
+    const NOWHERE: Self = Self { power: f64::NEG_INFINITY, logs: 1.0 };
 
     /// Compares magnitudes; the larger one comes first.
     pub(super) fn compare(self, other: Self) -> Ordering {
@@ -72,10 +75,11 @@ impl Order {
         Self { power: self.power + steps as f64, ..self }
     }
 
-    /// Returns whether orders differ by a whole power of ε.
-    pub(super) fn is_in_steps_from(self, other: Self) -> bool {
-        let step = self.power - other.power;
-        self.logs == other.logs && step == step.round() && step.abs() <= MOST_STEPS
+    /// Returns the whole powers of ε from a larger order to this one, if rows have so many.
+    pub(super) fn row_from(self, first: Self) -> Option<usize> {
+        let step = self.power - first.power;
+        let is_row = self.logs == first.logs && step == step.round() && (0.0..length() as f64).contains(&step);
+        is_row.then_some(step as usize)
     }
 
     pub(super) fn larger(self, other: Self) -> Self {
@@ -118,6 +122,15 @@ impl Term {
     pub(super) fn plain(self) -> Option<(f64, f64)> {
         let plain = self.factor.to_scalar();
         plain.is_normal().then_some((plain, plain.abs() * self.doubt))
+    }
+
+    /// Returns the limit of a series that begins with this term.
+    pub(super) fn limit(self) -> Limit {
+        match self.order.compare(Order::ONE) {
+            Ordering::Less => Limit::Infinite(if self.is_negative() { -1.0 } else { 1.0 }),
+            Ordering::Equal => Limit::Finite(self.factor, self.doubt),
+            Ordering::Greater => Limit::zero(),
+        }
     }
 
     /// Returns whether the term is negative.
@@ -184,15 +197,36 @@ impl Series {
     }
 
     pub(super) fn undefined() -> Self {
+        Self { terms: Vec::new(), unknown: Order::NOWHERE }
+    }
+
+    /// Creates a series that more terms might tell more of.
+    pub(super) fn open() -> Self {
         Self { terms: Vec::new(), unknown: Order::ALWAYS }
+    }
+
+    /// Returns whether nothing is known because there are too few terms.
+    pub(super) fn is_open(&self) -> bool {
+        !self.is_defined() && self.unknown.logs <= 0.0
+    }
+
+    /// Returns what is known of a function of this series that needs its first term, if there is none.
+    fn without_terms(&self) -> Self {
+        match () {
+            () if !self.is_defined() => self.clone(),
+            () if self.is_zero() => Self::undefined(),
+            () => Self::open(),
+        }
+    }
+
+    /// Returns what is known of a function that needs a finite series.
+    fn not_finite(&self) -> Self {
+        let is_infinite = |first: &Term| first.order.is_larger_than(Order::ONE);
+        if self.terms.first().is_some_and(is_infinite) { Self::undefined() } else { self.without_terms() }
     }
 
     pub(super) fn terms(&self) -> &[Term] {
         &self.terms
-    }
-
-    pub(super) fn is_exact(&self) -> bool {
-        self.unknown.power == f64::INFINITY
     }
 
     /// Returns the order of the first unknown term.
@@ -228,13 +262,6 @@ impl Series {
         }
         terms.truncate(kept);
         Self { terms, unknown }
-    }
-
-    /// Notes that terms are missing, unless the series is undefined or 0.
-    fn note_short(&self) {
-        if self.is_defined() && !self.is_zero() {
-            IS_SHORT.set(true);
-        }
     }
 
     pub(super) fn is_defined(&self) -> bool {
@@ -273,7 +300,7 @@ impl Series {
 
     pub(super) fn times(&self, other: &Self) -> Self {
         if !self.is_defined() || !other.is_defined() {
-            return Self::undefined();
+            return Self { terms: Vec::new(), unknown: self.unknown.larger(other.unknown) };
         }
         if self.is_zero() || other.is_zero() {
             return Self::number(0.0);
@@ -290,7 +317,7 @@ impl Series {
         };
         // Powers of both ascend in whole steps, so that products need not be sorted.
         let last = own[self.terms.len().max(1) - 1] + others[other.terms.len().max(1) - 1];
-        let mut terms = Vec::with_capacity(LENGTHS[1] * LENGTHS[0]);
+        let mut terms = Vec::with_capacity(self.terms.len() * other.terms.len());
         for step in 0..=last {
             for (a, &at) in self.terms.iter().zip(&own) {
                 let partner = others[..other.terms.len()].iter().position(|&other| at + other == step);
@@ -302,8 +329,8 @@ impl Series {
 
     /// Returns the whole steps between the power of each term and that of the first; `None` if there are other powers,
     /// or logarithms.
-    fn steps(&self) -> Option<[usize; LENGTHS[1]]> {
-        let (mut steps, first) = ([0; LENGTHS[1]], self.leading().power);
+    fn steps(&self) -> Option<[usize; LONGEST]> {
+        let (mut steps, first) = ([0; LONGEST], self.leading().power);
         for (step, term) in steps.iter_mut().zip(&self.terms) {
             let distance = term.order.power - first;
             if term.order.logs != 0.0 || distance != distance.round() || distance > MOST_STEPS {
@@ -337,17 +364,13 @@ impl Series {
 
     /// Splits t (1 + r) into t and the infinitesimal r; `None` if no term is known.
     fn split(&self) -> Option<(Term, Self)> {
-        let Some(&first) = self.terms.first() else {
-            self.note_short();
-            return None;
-        };
+        let &first = self.terms.first()?;
         Some((first, Self { terms: self.terms[1..].to_vec(), ..*self }.over(first)))
     }
 
     /// Splits c + r into the number c and the infinitesimal r; `None` if it is not finite.
     pub(super) fn finite(&self) -> Option<(f64, Self)> {
         if !Order::ONE.is_larger_than(self.unknown) {
-            self.note_short();
             return None;
         }
         match self.terms.first() {
@@ -375,7 +398,7 @@ impl Series {
     }
 
     pub(super) fn reciprocal(&self) -> Self {
-        let Some((first, rest)) = self.split() else { return Self::undefined() };
+        let Some((first, rest)) = self.split() else { return self.without_terms() };
         rest.composed(|k| if k.is_multiple_of(2) { 1.0 } else { -1.0 }).over(first)
     }
 
@@ -388,7 +411,7 @@ impl Series {
             return match exponent > 0.0 {
                 true if self.is_zero() => self.clone(),
                 true => Self { terms: Vec::new(), unknown: self.unknown.raised(exponent) },
-                false => Self::undefined(),
+                false => self.without_terms(),
             };
         };
         let odd = exponent % 2.0 != 0.0;
@@ -397,9 +420,8 @@ impl Series {
         }
         let size = first.factor.abs().powf::<Baseline>(factor(exponent));
         let size = if is_negative(first.factor) && odd { -size } else { size };
-        let binomial = |k: usize| (0..k).map(|i| (exponent - i as f64) / (i + 1) as f64).product();
         let order = first.order.raised(-exponent);
-        rest.composed(binomial).over(Term { order, factor: factor(1.0) / size, doubt: first.doubt })
+        rest.composed(|k| binomial(exponent, k)).over(Term { order, factor: factor(1.0) / size, doubt: first.doubt })
     }
 
     pub(super) fn exp(&self) -> Self {
@@ -407,7 +429,7 @@ impl Series {
             let size = factor(constant).exp::<Baseline>();
             return rest.composed(|k| 1.0 / factorial(k)).times(&Self::constant(size));
         }
-        let Some((first, _)) = self.split() else { return Self::undefined() };
+        let Some((first, _)) = self.split() else { return self.without_terms() };
         // e^(a ln(1/ε) + r) = ε^(−a) eʳ.
         if first.order.compare(Order { power: 0.0, logs: 1.0 }) == Ordering::Equal {
             let order = Order { power: first.factor.to_scalar(), logs: 0.0 };
@@ -419,21 +441,19 @@ impl Series {
     }
 
     pub(super) fn ln(&self) -> Self {
-        let Some((first, rest)) = self.split() else { return Self::undefined() };
+        let Some((first, rest)) = self.split() else { return self.without_terms() };
         // ln ln(1/ε) is not a term of a series.
         if is_negative(first.factor) || first.order.logs != 0.0 {
             return Self::undefined();
         }
         let log = Term::exact(Order { power: 0.0, logs: 1.0 }, factor(-first.order.power));
         let constant = Term { order: Order::ONE, factor: first.factor.ln::<Baseline>(), doubt: first.doubt };
-        let series =
-            rest.composed(|k| if k == 0 { 0.0 } else { (if k.is_multiple_of(2) { -1.0 } else { 1.0 }) / k as f64 });
-        Self::of(vec![log, constant], Order::NEVER).plus(&series)
+        Self::of(vec![log, constant], Order::NEVER).plus(&rest.composed(logarithmic))
     }
 
     /// Returns sine and cosine.
     pub(super) fn sin_cos(&self) -> (Self, Self) {
-        let Some((constant, rest)) = self.finite() else { return (Self::undefined(), Self::undefined()) };
+        let Some((constant, rest)) = self.finite() else { return (self.not_finite(), self.not_finite()) };
         let alternating = |k: usize| (if (k / 2).is_multiple_of(2) { 1.0 } else { -1.0 }) / factorial(k);
         let sine = rest.composed(|k| if k % 2 == 1 { alternating(k) } else { 0.0 });
         let cosine = rest.composed(|k| if k % 2 == 0 { alternating(k) } else { 0.0 });
@@ -446,7 +466,7 @@ impl Series {
 
     /// Returns the arctangent of a finite series.
     fn arctangent(&self) -> Self {
-        let Some((constant, rest)) = self.finite() else { return Self::undefined() };
+        let Some((constant, rest)) = self.finite() else { return self.not_finite() };
         // atan(c + r) = atan c + atan(r / (1 + c² + c r)).
         let below = Self::number(1.0 + constant * constant).plus(&rest.scaled(constant));
         let slight = rest.times(&below.reciprocal());
@@ -477,16 +497,11 @@ impl Series {
     pub(super) fn limit(&self) -> Limit {
         let Some(first) = self.terms.first() else {
             if Order::ONE.is_larger_than(self.unknown) {
-                return Limit::Finite(factor(0.0));
+                return Limit::zero();
             }
-            self.note_short();
-            return Limit::Unknown;
+            return if self.is_defined() || self.is_open() { Limit::Open } else { Limit::Unknown };
         };
-        match first.order.compare(Order::ONE) {
-            Ordering::Less => Limit::Infinite(self.sign()),
-            Ordering::Equal => Limit::Finite(first.factor),
-            Ordering::Greater => Limit::Finite(factor(0.0)),
-        }
+        first.limit()
     }
 }
 
@@ -503,6 +518,20 @@ fn sum_of(terms: &[Term]) -> Option<Term> {
     is_known.then(|| Term { factor: sum, doubt: (largest / sum.abs()).to_scalar(), ..*first })
 }
 
+/// Returns coefficient k of (1 + r)^exponent.
+pub(super) fn binomial(exponent: f64, k: usize) -> f64 {
+    (0..k).map(|i| (exponent - i as f64) / (i + 1) as f64).product()
+}
+
+/// Returns coefficient k of ln(1 + r).
+pub(super) fn logarithmic(k: usize) -> f64 {
+    match k {
+        0 => 0.0,
+        _ if k.is_multiple_of(2) => -1.0 / k as f64,
+        _ => 1.0 / k as f64,
+    }
+}
+
 fn factorial(k: usize) -> f64 {
     (1..=k).map(|i| i as f64).product()
 }
@@ -510,10 +539,18 @@ fn factorial(k: usize) -> f64 {
 /// Limit of a number as ε → 0.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Limit {
-    /// A finite number.
-    Finite(Unbounded<f64>),
+    /// A finite number. Its relative error is this many roundoffs.
+    Finite(Unbounded<f64>, f64),
     /// An infinity with the sign of this number.
     Infinite(f64),
     /// The number is not defined along the ray.
     Unknown,
+    /// More terms might tell the limit.
+    Open,
+}
+
+impl Limit {
+    pub(super) fn zero() -> Self {
+        Self::Finite(factor(0.0), 1.0)
+    }
 }
