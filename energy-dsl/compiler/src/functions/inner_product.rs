@@ -1,12 +1,15 @@
 //! Inner products as primitives, so that derivatives are gathered at them: the six or nine coordinates of a membrane
 //! enter its strain through three inner products.
 
-use crate::graph::{Form, Graph, NodeId, Primitive, Product, Rule, symmetric_index};
+use crate::graph::{Form, Graph, NodeId, Op, Primitive, Product, Rule, symmetric_index};
 
 /// Creates Σ xᵢ yᵢ. For a vector with itself the primitive is half of it, whose derivatives x and 1 need no factors.
 pub(super) fn inner_product(g: &mut Graph, x: &[NodeId], y: &[NodeId]) -> NodeId {
     // x·y and y·x are the same node.
     let (x, y) = if y < x { (y, x) } else { (x, y) };
+    if let Some(quotient) = quotient(g, x, y) {
+        return quotient;
+    }
     let value = g.dot(x, y);
     let square = x == y;
     // Shared arguments would have to be summed, so such products follow the ordinary rules.
@@ -31,4 +34,35 @@ pub(super) fn inner_product(g: &mut Graph, x: &[NodeId], y: &[NodeId]) -> NodeId
     let value = g.mul(half, value);
     let half_square = g.add_rule(Rule::factored(Primitive::InnerProduct, arguments, value, first, second), &[]);
     g.mul(two, half_square)
+}
+
+/// Returns (a·b)/(d e) for x = a/d and y = b/e, such as the entries of an inverse: one quotient has shorter derivatives
+/// than each entry. `None` if neither has a common divisor that moves.
+fn quotient(g: &mut Graph, x: &[NodeId], y: &[NodeId]) -> Option<NodeId> {
+    if g.form() == Form::Textbook {
+        return None;
+    }
+    let (a, b) = (over_common_divisor(g, x), over_common_divisor(g, y));
+    if a.is_none() && b.is_none() {
+        return None;
+    }
+    let one = g.constant(1.0);
+    let (a, d) = a.unwrap_or_else(|| (x.to_vec(), one));
+    let (b, e) = b.unwrap_or_else(|| (y.to_vec(), one));
+    let (product, divisor) = (inner_product(g, &a, &b), g.mul(d, e));
+    Some(g.div(product, divisor))
+}
+
+/// Returns the dividends and the divisor, if all entries are quotients with the same divisor, which moves.
+fn over_common_divisor(g: &Graph, x: &[NodeId]) -> Option<(Vec<NodeId>, NodeId)> {
+    let split = |&part: &NodeId| match g.op(part) {
+        Op::Div(dividend, divisor) => Some((dividend, divisor)),
+        _ => None,
+    };
+    let (_, common) = x.first().and_then(split).filter(|&(_, divisor)| x.len() > 1 && g.varies(divisor))?;
+    let dividends: Option<Vec<NodeId>> = x
+        .iter()
+        .map(|part| split(part).filter(|&(_, divisor)| divisor == common).map(|(dividend, _)| dividend))
+        .collect();
+    Some((dividends?, common))
 }
