@@ -1,6 +1,6 @@
-//! Second derivatives gathered at a cut. If everything that moves enters U through a few robust primitives c, then ∇²U
-//! = Σ ∂U/∂c ∇²c + Σ (Σ ∂²U/∂c∂c′ ∇c′) ∇cᵀ. There are few derivatives with respect to c, and each ∇c appears in one
-//! outer product.
+//! Second derivatives gathered at a cut. If everything that moves enters U through a few numbers c, then ∇²U = Σ ∂U/∂c
+//! ∇²c + Σ (Σ ∂²U/∂c∂c′ ∇c′) ∇cᵀ. There are few derivatives with respect to c, and each ∇c appears in one outer product.
+//! The numbers are robust primitives, or the nodes of a narrow part of the graph.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -8,23 +8,34 @@ use super::adjoint::{self, Weighted};
 use super::coordinates::Coordinates;
 use super::forward::{self, Sparse, combine, tangents};
 use super::local::Order;
-use super::{accumulate, differentiable};
+use super::{accumulate, differentiable, moving_operands};
 use crate::graph::{Graph, NodeId, Op};
 
-/// ∇U, and the upper triangle of ∇²U by index.
-pub(super) type Derivatives = (Vec<NodeId>, BTreeMap<usize, NodeId>);
+/// Derivatives gathered at a cut.
+pub(super) struct Gathered {
+    /// ∇U.
+    pub(super) gradient: Vec<NodeId>,
+    /// The upper triangle of ∇²U by index.
+    pub(super) hessian: BTreeMap<usize, NodeId>,
+    /// Whether they are right everywhere, not only on the ordinary path.
+    pub(super) safe: bool,
+}
 
-/// Returns the derivatives through the primitives closest to the coordinates; `None` if these are not a cut, or bring
-/// no gain.
-pub(super) fn derivatives(g: &mut Graph, output: NodeId, coordinates: &Coordinates) -> Option<Derivatives> {
-    let cut = primitives_by_coordinates(g, output, coordinates)?;
+/// Returns the derivatives through the nodes of a cut; `None` if that is not right on the ordinary path.
+pub(super) fn derivatives(
+    g: &mut Graph,
+    output: NodeId,
+    cut: &[NodeId],
+    coordinates: &Coordinates,
+) -> Option<Gathered> {
     let n = coordinates.len();
-    let (slopes, curvatures) = by_cut(g, output, &cut);
+    let (slopes, curvatures, is_safe_above) = by_cut(g, output, cut);
+    let safe = is_safe_above && adjoint::is_safe(g, cut, Order::Second, true);
     let weights: Weighted = cut.iter().copied().zip(slopes).collect();
     let gradient = adjoint::gradient(g, &weights, coordinates, Order::Second)?;
     let mut hessian = adjoint::second_derivatives(g, &weights, coordinates)?;
 
-    let tangents = tangents(g, &cut, coordinates, Order::Second);
+    let tangents = tangents(g, cut, coordinates, Order::Second);
     let none = Sparse::new();
     let m = cut.len();
     for (row, node) in cut.iter().enumerate() {
@@ -44,27 +55,47 @@ pub(super) fn derivatives(g: &mut Graph, output: NodeId, coordinates: &Coordinat
             }
         }
     }
-    Some((gradient, hessian))
+    Some(Gathered { gradient, hessian, safe })
 }
 
-/// Returns the first and second derivatives of U with respect to the nodes of the cut.
-fn by_cut(g: &mut Graph, output: NodeId, cut: &[NodeId]) -> (Vec<NodeId>, BTreeMap<usize, NodeId>) {
+/// Returns the first and second derivatives of U with respect to the nodes of the cut, and whether they are right
+/// everywhere.
+fn by_cut(g: &mut Graph, output: NodeId, cut: &[NodeId]) -> (Vec<NodeId>, BTreeMap<usize, NodeId>, bool) {
     let coordinates = Coordinates::of_nodes(g, cut);
     let whole = adjoint::alone(g, output);
-    let slopes = match adjoint::gradient(g, &whole, &coordinates, Order::Second) {
-        Some(slopes) => slopes,
-        None => forward::first_derivatives(g, &[output], &coordinates, Order::First).remove(0),
-    };
-    let curvatures = match adjoint::second_derivatives(g, &whole, &coordinates) {
-        Some(curvatures) => curvatures,
-        None => forward::second_derivatives(g, output, &coordinates),
-    };
-    (slopes, curvatures)
+    let slopes = adjoint::gradient(g, &whole, &coordinates, Order::Second);
+    let curvatures = adjoint::second_derivatives(g, &whole, &coordinates);
+    if let (Some(slopes), Some(curvatures)) = (slopes, curvatures) {
+        return (slopes, curvatures, adjoint::is_safe(g, &[output], Order::Second, true));
+    }
+    let slopes = forward::first_derivatives(g, &[output], &coordinates, Order::First).remove(0);
+    (slopes, forward::second_derivatives(g, output, &coordinates), true)
+}
+
+/// Returns the narrowest parts of the graph between the coordinates and U, of those that are closest to the coordinates:
+/// one node, and several.
+///
+/// U is replaced by what it is computed from, the last node first. What is left at any time is a cut.
+pub(super) fn waists(g: &Graph, output: NodeId, coordinates: &Coordinates) -> Vec<Vec<NodeId>> {
+    let mut front = BTreeSet::from([output]);
+    let (mut single, mut several): (Option<Vec<NodeId>>, Option<Vec<NodeId>>) = (None, None);
+    while let Some(last) = front.iter().copied().rfind(|node| !coordinates.seeds.contains_key(node)) {
+        front.remove(&last);
+        front.extend(moving_operands(g, last, Order::Second).into_iter().filter(|&node| g.varies(node)));
+        let size = front.len();
+        let narrowest = several.as_ref().map_or(coordinates.len(), |cut| cut.len() + 1);
+        match size {
+            1 => (single, several) = (Some(front.iter().copied().collect()), None),
+            _ if size < narrowest => several = Some(front.iter().copied().collect()),
+            _ => {}
+        }
+    }
+    single.into_iter().chain(several).collect()
 }
 
 /// Returns the robust primitives that depend on no other one, if every path from the coordinates to U leads through
 /// them.
-fn primitives_by_coordinates(g: &Graph, output: NodeId, coordinates: &Coordinates) -> Option<Vec<NodeId>> {
+pub(super) fn primitives(g: &Graph, output: NodeId, coordinates: &Coordinates) -> Option<Vec<NodeId>> {
     let nodes = differentiable(g, &[output], Order::Second);
     // Nodes that depend on some primitive.
     let mut above: BTreeSet<NodeId> = BTreeSet::new();

@@ -61,6 +61,8 @@ fn choose(
         let nodes = [values, &alternative.nodes].concat();
         let count = match ordinary(g, &nodes) {
             Some((nodes, guard)) => count(g, &[&nodes[..], &[guard]].concat()),
+            // There is only one path, the general one.
+            None if !alternative.safe => continue,
             None => count(g, &nodes),
         };
         order.push((number, Route { name: alternative.name, count, cost: count.cost() }));
@@ -109,8 +111,12 @@ pub fn second_order(
             offer("adjoint-weighted, reverse gradient", gradient, &hessian, safe);
         }
     }
-    if let Some((gradient, entries)) = cut::derivatives(g, value, coordinates) {
-        offer("gathered at primitives", &gradient, &dense(entries), safe);
+    let primitives = cut::primitives(g, value, coordinates).map(|cut| ("gathered at primitives", cut));
+    let waists = cut::waists(g, value, coordinates).into_iter().map(|cut| ("gathered at a waist", cut));
+    for (name, cut) in primitives.into_iter().chain(waists) {
+        if let Some(found) = cut::derivatives(g, value, &cut, coordinates) {
+            offer(name, &found.gradient, &dense(found.hessian), found.safe);
+        }
     }
     let (mut gradient, plan) = choose(g, routine, &[value], &alternatives);
     let hessian = gradient.split_off(n);
