@@ -13,6 +13,7 @@ use pyo3::types::{PyDict, PyFloat, PyInt, PyString, PyTuple};
 use crate::arrays::{Given, Precision, tuple, wrong_shape};
 use crate::errors::wrong;
 use crate::evaluation::{Batch, Elements, Request};
+use crate::interrupt::compiled;
 
 /// An input of an element.
 #[pyclass(frozen, get_all, module = "energy_dsl")]
@@ -95,8 +96,7 @@ impl BoundCall {
 #[pyfunction]
 #[pyo3(signature = (text, file = "<text>"))]
 pub fn energies(py: Python<'_>, text: &str, file: &str) -> PyResult<Vec<Element>> {
-    let elements =
-        py.detach(|| Interpreted::from_file(text, file).map_err(|errors| errors.to_string())).map_err(wrong)?;
+    let elements = compiled(py, |budget| Interpreted::from_file_within(text, file, budget))?;
     let text = Arc::new([text.to_owned(), file.to_owned()]);
     let element = |(number, inner)| Element::new(inner, Origin::Text(Arc::clone(&text), number));
     Ok(elements.into_iter().enumerate().map(element).collect())

@@ -4,6 +4,7 @@ mod arrays;
 mod element;
 mod errors;
 mod evaluation;
+mod interrupt;
 mod exclusive;
 mod simulation;
 mod stencils;

@@ -6,7 +6,7 @@ use clap::{Args, ValueEnum};
 use cloth_core::output::OutputFolder;
 use cloth_core::run::{Ending, Event, Forecast, Log, Progress, Run, RunError, RunOptions, stats};
 use cloth_core::scene::{self, Scene};
-use energy_cli::{Interrupts, tell};
+use energy_cli::{Interrupts, Notice, tell};
 use serde_json::{Value, json};
 
 use super::allowed_folders::AllowedFolders;
@@ -66,6 +66,8 @@ impl RunScene {
             text = scene::with_untangling(&text);
         }
         allowed.check(&text, &scene)?;
+        let compiles = text.contains(".energy");
+        let notice = compiles.then(|| Notice::of(format!("compiling the materials of {} …", scene.display())));
         let Some(output) = output.filter(|_| !self.dry_run) else {
             return dry_run(&text, &scene, threads, log);
         };
@@ -74,6 +76,7 @@ impl RunScene {
             RunError::Simulation(error) => anyhow::Error::new(error).context(scene.display().to_string()),
             located => located.into(),
         })?;
+        drop(notice);
         simulate(limit_threads(run, threads), stats, log)
     }
 }

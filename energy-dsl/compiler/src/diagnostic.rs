@@ -1,5 +1,6 @@
 //! Errors as values: what was expected, what was found, where, and how to fix it.
 
+use std::borrow::Cow;
 use std::fmt;
 use std::rc::Rc;
 
@@ -56,7 +57,8 @@ impl Span {
         let excerpt = self.excerpt.as_ref()?;
         let (line, _, column) = excerpt.line();
         let marked = excerpt.text[excerpt.start..excerpt.end.max(excerpt.start)].lines().next().unwrap_or("");
-        let width = marked.chars().count();
+        let (line, column) = around(line, column);
+        let width = marked.chars().count().min(line.chars().count().saturating_sub(column));
         Some(format!("\n  | {line}\n  | {}{}", " ".repeat(column), "^".repeat(width.max(1))))
     }
 
@@ -74,6 +76,36 @@ impl Span {
     }
 }
 
+/// Maximum number of characters of a message.
+const LONGEST_MESSAGE: usize = 1000;
+
+/// Leaves out the middle of a message that quotes a long text.
+fn shortened(message: String) -> String {
+    if message.len() <= LONGEST_MESSAGE {
+        return message;
+    }
+    let (length, kept) = (message.chars().count(), LONGEST_MESSAGE / 2);
+    let part = |from: usize| message.chars().skip(from).take(kept).collect::<String>();
+    if length <= LONGEST_MESSAGE { message } else { format!("{} … {}", part(0), part(length - kept)) }
+}
+
+/// Maximum number of characters of a quoted line.
+const LONGEST_LINE: usize = 400;
+
+/// Returns the part of a long line around a column, and the column in it.
+fn around(line: &str, column: usize) -> (Cow<'_, str>, usize) {
+    if line.chars().count() <= LONGEST_LINE {
+        return (line.into(), column);
+    }
+    let first = column.saturating_sub(LONGEST_LINE / 4);
+    let part: String = line.chars().skip(first).take(LONGEST_LINE).collect();
+    if first == 0 {
+        (format!("{part}…").into(), column)
+    } else {
+        (format!("…{part}…").into(), column - first + 1)
+    }
+}
+
 /// An error in a text.
 #[derive(Clone, Debug)]
 pub struct Diagnostic {
@@ -87,12 +119,21 @@ pub struct Diagnostic {
     pub other: Option<(String, Span)>,
     /// Whether rustc has reported the error, as it does with a bad escape in a string. It is not reported again.
     pub known_to_rustc: bool,
+    /// Whether compiling ended here. What is reported afterwards may be a consequence, and is left out.
+    pub(crate) is_end: bool,
 }
 
 impl Diagnostic {
     /// Creates an error at a place.
     pub fn new(span: &Span, message: impl Into<String>) -> Self {
-        Self { message: message.into(), help: None, span: span.clone(), other: None, known_to_rustc: false }
+        Self {
+            message: shortened(message.into()),
+            help: None,
+            span: span.clone(),
+            other: None,
+            known_to_rustc: false,
+            is_end: false,
+        }
     }
 
     /// Creates an error that rustc has reported already.
@@ -132,6 +173,9 @@ impl fmt::Display for Diagnostic {
     }
 }
 
+/// Maximum number of errors of a text; further ones are left out.
+const MOST_ERRORS: usize = 100;
+
 /// All errors of a text, in the order they were found. They are displayed with line:column.
 #[derive(Clone, Debug, Default)]
 pub struct Diagnostics(pub Vec<Diagnostic>);
@@ -139,9 +183,15 @@ pub struct Diagnostics(pub Vec<Diagnostic>);
 impl Diagnostics {
     /// Adds an error, unless rustc has reported it.
     pub fn push(&mut self, diagnostic: Diagnostic) {
-        if !diagnostic.known_to_rustc {
+        let ended = self.0.len() >= MOST_ERRORS || self.0.last().is_some_and(|last| last.is_end);
+        if !diagnostic.known_to_rustc && !ended {
             self.0.push(diagnostic);
         }
+    }
+
+    /// Adds all errors of a part.
+    pub(crate) fn append(&mut self, part: Self) {
+        part.0.into_iter().for_each(|diagnostic| self.push(diagnostic));
     }
 
     /// Returns `value` if there are no errors.
@@ -177,11 +227,17 @@ impl fmt::Display for Diagnostics {
 
 impl std::error::Error for Diagnostics {}
 
+/// Longest name that is compared with others.
+const LONGEST_NAME: usize = 100;
+
 /// Returns the known name that `name` is probably a misspelling of.
 #[must_use]
 pub fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     // Single letters are excluded: each is similar to every other.
     let length = name.chars().count();
+    if length > LONGEST_NAME {
+        return None;
+    }
     let limit = (1 + length / 4).min(length.saturating_sub(1));
     let distance = |known: &str| match known.to_lowercase() == name.to_lowercase() {
         true => 0,

@@ -9,6 +9,7 @@
 //! the macro does; [`Interpreted`], [`Textbook`] and [`Listing`] look at a declaration that is read at run time.
 #![forbid(unsafe_code)]
 
+mod budget;
 mod check;
 mod diagnostic;
 mod diff;
@@ -25,6 +26,7 @@ mod statements;
 mod syntax;
 mod tape;
 
+pub use budget::{Budget, Limits, Phase, Progress};
 pub use check::unit_exponents;
 pub use diagnostic::{Diagnostic, Diagnostics};
 pub use functions::{Function, all as functions, robust_spellings};

@@ -5,7 +5,8 @@ use std::path::PathBuf;
 use proc_macro2::{Span, TokenStream};
 use quote::quote;
 
-use crate::check::check;
+use crate::budget::Budget;
+use crate::check::{Program, check};
 use crate::diagnostic::{self, Diagnostic, Diagnostics};
 use crate::emit::emit;
 use crate::inspect::write_code;
@@ -42,23 +43,38 @@ pub fn compile_file(text: &str, file: &str, at: Span) -> TokenStream {
     compile_items(&items, diagnostics)
 }
 
+/// Maximum number of stubs: they cost memory as other declarations do.
+const MOST_STUBS: usize = 50;
+
 fn compile_items(items: &[syntax::Item], mut diagnostics: Diagnostics) -> TokenStream {
-    let programs = check(items, &mut diagnostics);
-    let folder = std::env::var_os("ENERGY_DUMP_DIR").map(PathBuf::from);
-    let mut code = TokenStream::new();
+    let programs = check(items, &Budget::default().trusting(), &mut diagnostics);
+    let (mut code, mut stubs) = (TokenStream::new(), 0);
     for program in &programs {
-        let formulas = lower(program);
-        let routines = differentiate(program, formulas);
-        prove(program, &routines, program.audit_samples.is_some(), &mut diagnostics);
-        let items = emit(program, &routines);
-        if let Some(folder) = &folder
-            && let Err(error) = write_code(folder, &program.name, &items)
-        {
-            let message = format!("ENERGY_DUMP_DIR: cannot write {} to {}: {error}", program.name, folder.display());
-            diagnostics.push(Diagnostic::new(&program.span, message));
+        let compiled = program.budget.within(|| compile_program(program, &mut diagnostics));
+        match compiled {
+            Ok(items) => code.extend(items),
+            Err(stop) => {
+                diagnostics.push(program.stopped(stop));
+                stubs += 1;
+                if stubs <= MOST_STUBS {
+                    code.extend(compile_program(&program.stub(), &mut diagnostics));
+                }
+            }
         }
-        code.extend(items);
     }
     let errors = diagnostics.0.iter().map(|d| syn::Error::new(d.span.token, d).to_compile_error());
     quote!(#code #(#errors)*)
+}
+
+fn compile_program(program: &Program, diagnostics: &mut Diagnostics) -> TokenStream {
+    let routines = differentiate(program, lower(program));
+    prove(program, &routines, program.audit_samples.is_some(), diagnostics);
+    let items = emit(program, &routines);
+    if let Some(folder) = std::env::var_os("ENERGY_DUMP_DIR").map(PathBuf::from)
+        && let Err(error) = write_code(&folder, &program.name, &items)
+    {
+        let message = format!("ENERGY_DUMP_DIR: cannot write {} to {}: {error}", program.name, folder.display());
+        diagnostics.push(Diagnostic::new(&program.span, message));
+    }
+    items
 }

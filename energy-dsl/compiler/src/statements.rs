@@ -1,8 +1,9 @@
 //! The statements of a routine in the order of execution. The Rust renderer (`emit`), the block tape (`tape`) and
 //! planted faults read the same list.
 
-use std::collections::BTreeMap;
+use rustc_hash::FxHashMap;
 
+use crate::budget::Budget;
 use crate::graph::{Graph, NodeId, Op};
 
 /// Straight-line code. Each statement is one operation; its operands are the numbers of earlier statements.
@@ -42,13 +43,18 @@ pub(crate) const RETURNED: usize = usize::MAX;
 /// Puts the nodes of a graph in order: each is computed just before its first use.
 pub(crate) struct Sequence<'a> {
     graph: &'a Graph,
-    places: BTreeMap<NodeId, NodeId>,
+    places: FxHashMap<NodeId, NodeId>,
     statements: Statements,
 }
 
 impl<'a> Sequence<'a> {
     pub(crate) fn new(graph: &'a Graph) -> Self {
-        Self { graph, places: BTreeMap::new(), statements: Statements::default() }
+        Self { graph, places: FxHashMap::default(), statements: Statements::default() }
+    }
+
+    /// Returns the budget that pays for the statements.
+    pub(crate) fn budget(&self) -> &Budget {
+        self.graph.budget()
     }
 
     /// Returns the statements so far.
@@ -94,6 +100,7 @@ impl<'a> Sequence<'a> {
     }
 
     fn compute(&mut self, node: NodeId) {
+        self.graph.budget().spend(1, 0);
         let op = self.graph.fused(node).with_operands(|operand| self.places[&self.graph.resolve(operand)]);
         let place = NodeId(u32::try_from(self.statements.list.len()).expect("fewer than 2³² statements"));
         self.places.insert(node, place);
@@ -145,7 +152,7 @@ impl Code {
     pub(crate) fn with_guard(&self, guard: &Self, shared: bool) -> Self {
         let mut code = self.clone();
         let list = &mut code.statements.list;
-        let mut known = BTreeMap::new();
+        let mut known = FxHashMap::default();
         if shared {
             known.extend(list.iter().zip(0..).map(|(&op, place)| (op, NodeId(place))));
         }

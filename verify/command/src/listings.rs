@@ -1,7 +1,8 @@
 use std::path::Path;
 
 use anyhow::Context;
-use energy_compiler::Listing;
+use energy_cli::Notice;
+use energy_compiler::{Budget, Listing};
 
 /// The largest `.energy` file, in bytes.
 const LARGEST_TEXT: u64 = 16 << 20;
@@ -14,8 +15,10 @@ pub fn listings(name: &str) -> anyhow::Result<Vec<Listing>> {
     if Path::new(name).extension().is_some_and(|extension| extension == "energy") {
         let text =
             energy_files::read_text(Path::new(name), LARGEST_TEXT).with_context(|| format!("cannot read {name}"))?;
-        let all = Listing::from_file(&text, name).map_err(|errors| anyhow::anyhow!("{errors}"))?;
-        anyhow::ensure!(!all.is_empty(), "{name} contains no declaration; is a comment `/*` left open?");
+        let _notice = Notice::of(format!("compiling {name} …"));
+        let all = Listing::from_file_within(&text, name, &Budget::default().trusting());
+        let all = all.map_err(|errors| anyhow::anyhow!("{errors}"))?;
+        anyhow::ensure!(!all.is_empty(), "{name} contains no declaration");
         return Ok(all);
     }
     let names = || energy_catalogue::catalogue().iter().map(|e| e.declaration.name).collect::<Vec<_>>().join(", ");

@@ -1,7 +1,7 @@
 use std::path::Path;
 
 use anyhow::Context;
-use energy_compiler::{Interpreted, Textbook};
+use energy_compiler::{Budget, Interpreted, Textbook};
 use energy_dsl::{AnyElement, Declaration, Inputs, Kind, Outputs, RestError};
 use fastrand::Rng;
 
@@ -40,7 +40,15 @@ impl Target {
     /// # Errors
     /// If the text has errors.
     pub fn of_text(text: &str, name: &str) -> Result<Vec<Self>, energy_compiler::Diagnostics> {
-        let elements = Interpreted::from_file(text, name)?;
+        Self::of_text_within(text, name, &Budget::default())
+    }
+
+    /// Returns every declaration of a text, compiled within a budget.
+    ///
+    /// # Errors
+    /// If the text has errors, or takes more than the budget.
+    pub fn of_text_within(text: &str, name: &str, budget: &Budget) -> Result<Vec<Self>, energy_compiler::Diagnostics> {
+        let elements = Interpreted::from_file_within(text, name, budget)?;
         Ok(elements.into_iter().map(|element| Self(Origin::Text(Box::new(element)))).collect())
     }
 
@@ -51,8 +59,9 @@ impl Target {
     pub fn of_file(path: &Path) -> anyhow::Result<Vec<Self>> {
         let text =
             energy_files::read_text(path, LARGEST_TEXT).with_context(|| format!("cannot read {}", path.display()))?;
-        let targets =
-            Self::of_text(&text, &path.display().to_string()).map_err(|errors| anyhow::anyhow!("{errors}"))?;
+        let name = path.display().to_string();
+        let targets = Self::of_text_within(&text, &name, &Budget::default().trusting());
+        let targets = targets.map_err(|errors| anyhow::anyhow!("{errors}"))?;
         anyhow::ensure!(!targets.is_empty(), "{} contains no declaration", path.display());
         Ok(targets)
     }
@@ -87,7 +96,8 @@ impl Target {
         match &self.0 {
             Origin::Catalogue(entry) => {
                 // A declaration's source includes the functions that it uses, so it compiles on its own.
-                let mut declared = Interpreted::from_source(declaration.source).map_err(|errors| errors.to_string())?;
+                let mut declared = Interpreted::from_source_within(declaration.source, &Budget::default().trusting())
+                    .map_err(|errors| errors.to_string())?;
                 let interpreted = declared.pop();
                 Subject::new(declaration, Box::new(entry.evaluate), interpreted)
             }

@@ -12,6 +12,7 @@ const MOST_TERMS: usize = 1024;
 
 impl<'a> Checker<'a> {
     /// Checks `[a, b, …]`.
+    #[inline(never)]
     pub(super) fn list(&mut self, items: &'a [Expression], span: &Span) -> Option<Typed> {
         let checked: Vec<_> = items.iter().map(|item| self.expression(item)).collect();
         let checked: Vec<_> = checked.into_iter().collect::<Option<_>>()?;
@@ -26,6 +27,7 @@ impl<'a> Checker<'a> {
 
     /// Checks `a[i]`: an entry of an array, a component of a vector, or a row of a matrix, so that `M[i][j]` is an
     /// entry.
+    #[inline(never)]
     pub(super) fn index(&mut self, of: &'a Expression, index: &'a Expression) -> Option<Typed> {
         let value = self.expression(of)?;
         let number = self.whole_number(index, "an index")?;
@@ -50,6 +52,7 @@ impl<'a> Checker<'a> {
     }
 
     /// Checks `v.x` and `q.w`.
+    #[inline(never)]
     pub(super) fn component(&mut self, of: &'a Expression, name: &Name) -> Option<Typed> {
         let value = self.expression(of)?;
         let letters = match value.shape {
@@ -85,6 +88,7 @@ impl<'a> Checker<'a> {
     }
 
     /// Checks and unrolls `sum(j in first..end, term)`.
+    #[inline(never)]
     pub(super) fn sum(&mut self, sum: &'a Sum, span: &Span) -> Option<Typed> {
         let (first, end) = (self.whole_number(&sum.first, "a range"), self.whole_number(&sum.end, "a range"));
         let (first, end) = (first?, end?);

@@ -6,27 +6,34 @@ use super::expression::{Checker, Meaning};
 use super::signature::Signature;
 use super::typed::{Binding, Typed, TypedKind};
 use super::vanishing::Vanishing;
+use crate::budget::Budget;
 use crate::diagnostic::{Diagnostic, Diagnostics};
 use crate::functions::Shape;
 use crate::syntax::{Constant, Expression, Name};
 
 /// Constants outside declarations, visible in all of them.
-#[derive(Default)]
 pub(super) struct Globals {
     pub(super) bindings: Vec<Binding>,
     pub(super) scope: BTreeMap<String, Option<Meaning>>,
     /// Names as written, by their canonical names.
     pub(super) spellings: BTreeMap<String, String>,
+    /// Pays for checking.
+    pub(super) budget: Budget,
 }
 
 impl Globals {
     /// Checks the constants in order. Each one sees those before it.
-    pub(super) fn of<'a>(constants: impl Iterator<Item = &'a Constant>, diagnostics: &mut Diagnostics) -> Self {
+    pub(super) fn of<'a>(
+        constants: impl Iterator<Item = &'a Constant>,
+        budget: &Budget,
+        diagnostics: &mut Diagnostics,
+    ) -> Self {
         let signature = Signature::empty();
-        let mut globals = Self::default();
+        let mut globals =
+            Self { bindings: Vec::new(), scope: BTreeMap::new(), spellings: BTreeMap::new(), budget: budget.clone() };
         for constant in constants {
             let canonical = constant.name.canonical();
-            let mut checker = Checker::new(&signature, &globals, &[], diagnostics);
+            let mut checker = Checker::new(&signature, &globals, &[], budget, diagnostics);
             let meaning = checker.constant(constant);
             globals.bindings = checker.bindings;
             globals.spellings.insert(canonical.clone(), constant.name.text.clone());
@@ -46,7 +53,14 @@ impl<'a> Checker<'a> {
             self.diagnostics.push(Diagnostic::new(&constant.value.span, message).help(help));
             return None;
         }
-        self.bindings.push(Binding { value, rest: false, unit: Some(constant.unit.clone()) });
+        let number = evaluate(&self.bindings, &value);
+        self.bindings.push(Binding {
+            value,
+            rest: false,
+            unit: Some(constant.unit.clone()),
+            constant: number,
+            depth: 1,
+        });
         Some(Meaning::Binding(self.bindings.len() - 1, Shape::Scalar))
     }
 
@@ -85,7 +99,7 @@ pub(super) fn evaluate(bindings: &[Binding], typed: &Typed) -> Option<f64> {
     match &typed.kind {
         TypedKind::Constant(value) => Some(*value),
         TypedKind::Pi => Some(std::f64::consts::PI),
-        TypedKind::Binding(number) => evaluate(bindings, &bindings[*number].value),
+        TypedKind::Binding(number) => bindings[*number].constant,
         TypedKind::Call(function, arguments) => {
             let numbers: Vec<f64> = arguments.iter().map(|a| evaluate(bindings, a)).collect::<Option<_>>()?;
             Some(match (function.name, numbers.as_slice()) {

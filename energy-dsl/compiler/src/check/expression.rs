@@ -4,12 +4,22 @@ use super::constant::Globals;
 use super::remedy;
 use super::signature::Signature;
 use super::typed::{Binding, Source, Typed, TypedKind};
+use crate::budget::Budget;
 use crate::diagnostic::{Diagnostic, Diagnostics, Span};
 use crate::functions::{self, Shape};
 use crate::syntax::{Body, Expression, ExpressionKind, Name, UserFunction, canonical, without_hat};
 
 /// Maximum number of calls of the text's functions in a formula. Each is inlined, and nested calls multiply.
 const MOST_CALLS: usize = 4096;
+
+/// Maximum number of nested expressions, through calls of the text's functions too. Checking recurses over them.
+const DEEPEST_EXPRESSION: usize = 1000;
+
+/// Maximum number of nested operations of a value, through other values too. Later passes recurse over them.
+const DEEPEST_VALUE: usize = 1600;
+
+/// Bytes of a typed expression.
+const TYPED_BYTES: u64 = 200;
 
 /// The meaning of a name.
 #[derive(Clone)]
@@ -41,6 +51,13 @@ pub(super) struct Checker<'a> {
     pub(super) terms: usize,
     pub(super) bindings: Vec<Binding>,
     pub(super) reads_velocities: bool,
+    budget: &'a Budget,
+    /// Whether the budget was spent or an expression too deep, which is reported once.
+    spent: bool,
+    /// Number of expressions that are being checked, each within the one before.
+    level: usize,
+    /// Name of the declaration.
+    pub(super) declaration: &'a str,
 }
 
 impl<'a> Checker<'a> {
@@ -48,6 +65,7 @@ impl<'a> Checker<'a> {
         signature: &'a Signature,
         globals: &Globals,
         functions: &[&'a UserFunction],
+        budget: &'a Budget,
         diagnostics: &'a mut Diagnostics,
     ) -> Self {
         let inputs = signature
@@ -70,6 +88,10 @@ impl<'a> Checker<'a> {
             terms: 0,
             bindings: globals.bindings.clone(),
             reads_velocities: false,
+            budget,
+            spent: false,
+            level: 0,
+            declaration: "the constants",
         }
     }
 
@@ -89,6 +111,7 @@ impl<'a> Checker<'a> {
         }
     }
 
+    #[inline(never)]
     pub(super) fn body(&mut self, body: &'a Body, outermost: bool) -> Option<Typed> {
         let outer_functions = self.functions.len();
         self.functions.extend(&body.functions);
@@ -114,6 +137,7 @@ impl<'a> Checker<'a> {
     }
 
     fn define(&mut self, name: &Name, value: Option<Typed>, rest: bool) {
+        let value = value.and_then(|value| self.check_depth(value));
         let meaning = value.map(|value| self.bind(value, rest));
         self.enter(name, meaning);
     }
@@ -129,7 +153,9 @@ impl<'a> Checker<'a> {
         match value.kind {
             TypedKind::Array(entries) => Meaning::Entries(entries.into_iter().map(|e| self.bind(e, rest)).collect()),
             _ => {
-                self.bindings.push(Binding { value, rest, unit: None });
+                let constant = super::constant::evaluate(&self.bindings, &value);
+                let depth = self.depth_of(&value);
+                self.bindings.push(Binding { value, rest, unit: None, constant, depth });
                 Meaning::Binding(self.bindings.len() - 1, shape)
             }
         }
@@ -140,46 +166,98 @@ impl<'a> Checker<'a> {
         self.scopes.iter().rev().find_map(|scope| scope.get(&canonical).cloned())
     }
 
+    /// Returns the number of nested expressions of a value, through bindings too.
+    pub(super) fn depth_of(&self, value: &Typed) -> usize {
+        1 + match &value.kind {
+            TypedKind::Binding(number) => self.bindings[*number].depth,
+            _ => value.parts().into_iter().map(|part| self.depth_of(part)).max().unwrap_or(0),
+        }
+    }
+
+    /// Refuses a value that depends on others through too many steps.
+    pub(super) fn check_depth(&mut self, value: Typed) -> Option<Typed> {
+        if self.depth_of(&value) <= DEEPEST_VALUE {
+            return Some(value);
+        }
+        self.too_deep(&value.span.clone(), DEEPEST_VALUE)
+    }
+
+    #[inline(never)]
+    fn too_deep(&mut self, span: &Span, levels: usize) -> Option<Typed> {
+        if !std::mem::replace(&mut self.spent, true) {
+            let message = format!("this value depends on others through more than {levels} nested operations");
+            let help = "sum over an index, or split the formula into several declarations";
+            self.diagnostics.push(Diagnostic::new(span, message).help(help));
+        }
+        None
+    }
+
     pub(super) fn expression(&mut self, expression: &'a Expression) -> Option<Typed> {
+        if self.level == DEEPEST_EXPRESSION {
+            return self.too_deep(&expression.span, DEEPEST_EXPRESSION);
+        }
+        self.level += 1;
+        let typed = self.typed(expression);
+        self.level -= 1;
+        typed
+    }
+
+    fn typed(&mut self, expression: &'a Expression) -> Option<Typed> {
         let span = &expression.span;
+        self.pay(1, span)?;
         match &expression.kind {
             ExpressionKind::Number(value) => Some(constant(*value, span)),
             ExpressionKind::Name(name) => self.name(name),
             ExpressionKind::Call(name, arguments) => self.call(name, arguments),
             ExpressionKind::Body(body) => self.body(body, self.scopes.len() == 3 && self.calls.is_empty()),
-            ExpressionKind::If(condition, yes, no) => {
-                let checked = self.expression(condition);
-                let (yes, no) = (self.body(yes, false), self.body(no, false));
-                let (condition_shape, yes, no) = (checked?, yes?, no?);
-                if condition_shape.shape != Shape::Truth {
-                    return self.error(
-                        &condition.span,
-                        format!("expected a comparison after `if`, found {}", condition_shape.shape),
-                    );
-                }
-                if yes.shape != no.shape {
-                    return self.error(
-                        span,
-                        format!("both branches must have the same shape, but they are {} and {}", yes.shape, no.shape),
-                    );
-                }
-                if matches!(yes.shape, Shape::Array(_) | Shape::Truth) {
-                    return self.error(span, format!("a branch must be a value, but it is {}", yes.shape));
-                }
-                // A constant condition is decided here. The other branch leaves no operations.
-                if let Some(truth) = super::constant::truth(&self.bindings, &condition_shape) {
-                    return Some(if truth { yes } else { no });
-                }
-                let shape = yes.shape;
-                let kind = TypedKind::Select(Box::new(condition_shape), Box::new(yes), Box::new(no));
-                Some(Typed { kind, shape, span: span.clone() })
-            }
+            ExpressionKind::If(condition, yes, no) => self.conditional([yes, no], condition, span),
             ExpressionKind::List(items) => self.list(items, span),
             ExpressionKind::Index(of, index) => self.index(of, index),
             ExpressionKind::Component(of, name) => self.component(of, name),
             ExpressionKind::Sum(sum) => self.sum(sum, span),
         }
     }
+
+    // Checking recurses over expressions: what is rarely needed has a frame of its own.
+    #[inline(never)]
+    fn conditional(&mut self, [yes, no]: [&'a Body; 2], condition: &'a Expression, span: &Span) -> Option<Typed> {
+        let checked = self.expression(condition);
+        let (yes, no) = (self.body(yes, false), self.body(no, false));
+        let (condition_shape, yes, no) = (checked?, yes?, no?);
+        if condition_shape.shape != Shape::Truth {
+            return self
+                .error(&condition.span, format!("expected a comparison after `if`, found {}", condition_shape.shape));
+        }
+        if yes.shape != no.shape {
+            return self.error(
+                span,
+                format!("both branches must have the same shape, but they are {} and {}", yes.shape, no.shape),
+            );
+        }
+        if matches!(yes.shape, Shape::Array(_) | Shape::Truth) {
+            return self.error(span, format!("a branch must be a value, but it is {}", yes.shape));
+        }
+        // A constant condition is decided here. The other branch leaves no operations.
+        if let Some(truth) = super::constant::truth(&self.bindings, &condition_shape) {
+            return Some(if truth { yes } else { no });
+        }
+        let shape = yes.shape;
+        let kind = TypedKind::Select(Box::new(condition_shape), Box::new(yes), Box::new(no));
+        Some(Typed { kind, shape, span: span.clone() })
+    }
+
+    /// Pays for typed expressions. `None` if the budget is spent.
+    #[inline(never)]
+    pub(super) fn pay(&mut self, expressions: usize, span: &Span) -> Option<()> {
+        let expressions = expressions as u64;
+        let Err(stop) = self.budget.try_spend(2 * expressions, TYPED_BYTES * expressions) else { return Some(()) };
+        if !std::mem::replace(&mut self.spent, true) {
+            self.diagnostics.push(stop.diagnostic(self.budget, span, self.declaration));
+        }
+        None
+    }
+
+    #[inline(never)]
     fn name(&mut self, name: &Name) -> Option<Typed> {
         if let Some(found) = self.find(&name.text) {
             self.used.insert(name.canonical());
@@ -217,6 +295,7 @@ impl<'a> Checker<'a> {
             }
             Meaning::Entries(entries) => entries,
         };
+        self.pay(entries.len(), &span)?;
         let entries: Vec<_> = entries.into_iter().map(|entry| self.meant(name, entry)).collect::<Option<_>>()?;
         let length = u16::try_from(entries.len()).expect("arrays are short");
         Some(Typed { kind: TypedKind::Array(entries), shape: Shape::Array(length), span })
@@ -252,11 +331,28 @@ impl<'a> Checker<'a> {
             "identity" => return self.identity(name, arguments),
             _ => {}
         }
+        let checked = self.arguments(arguments)?;
+        self.called(name, checked)
+    }
+
+    /// Checks all arguments, so that each error is reported.
+    fn arguments(&mut self, arguments: &'a [Expression]) -> Option<Vec<Typed>> {
+        let mut checked = Some(Vec::with_capacity(arguments.len()));
+        for argument in arguments {
+            let typed = self.expression(argument);
+            checked = checked.zip(typed).map(|(mut list, typed)| {
+                list.push(typed);
+                list
+            });
+        }
+        checked
+    }
+
+    #[inline(never)]
+    fn called(&mut self, name: &Name, checked: Vec<Typed>) -> Option<Typed> {
         // A function of the text with a name of the language is an error already.
         let user = self.functions.iter().rev().find(|f| f.name.text == name.text).copied();
         let user = user.filter(|_| functions::find(&name.text).is_none());
-        let checked: Vec<_> = arguments.iter().map(|a| self.expression(a)).collect();
-        let checked: Vec<_> = checked.into_iter().collect::<Option<_>>()?;
         if let Some(function) = user {
             return self.inline(name, function, checked);
         }
@@ -272,6 +368,7 @@ impl<'a> Checker<'a> {
         self.apply(&name.text, &name.span, checked)
     }
 
+    #[inline(never)]
     pub(super) fn apply(&mut self, name: &str, span: &Span, arguments: Vec<Typed>) -> Option<Typed> {
         let Some(function) = functions::find(name) else {
             let remedy = self.remedy_for_function(name);
@@ -315,6 +412,7 @@ impl<'a> Checker<'a> {
     }
 
     /// Inlines a function of the text: its body with the arguments bound.
+    #[inline(never)]
     fn inline(&mut self, name: &Name, function: &'a UserFunction, arguments: Vec<Typed>) -> Option<Typed> {
         if function.parameters.len() != arguments.len() {
             let message =
@@ -335,6 +433,7 @@ impl<'a> Checker<'a> {
             return None;
         }
         self.calls.push(function.name.text.clone());
+        self.pay(self.scopes[0].len(), &name.span)?;
         let scopes = vec![self.scopes[0].clone(), BTreeMap::new()];
         let outer = std::mem::replace(&mut self.scopes, scopes);
         for (parameter, argument) in function.parameters.iter().zip(arguments) {
@@ -346,6 +445,7 @@ impl<'a> Checker<'a> {
         result
     }
 
+    #[inline(never)]
     fn identity(&mut self, name: &Name, arguments: &[Expression]) -> Option<Typed> {
         match arguments {
             [Expression { kind: ExpressionKind::Number(n), .. }] if [2.0, 3.0, 4.0].contains(n) => {
@@ -356,6 +456,7 @@ impl<'a> Checker<'a> {
     }
 
     /// Checks `gradient(U, p)`, the derivative of a scalar with respect to a point or a parameter.
+    #[inline(never)]
     fn gradient(&mut self, name: &Name, arguments: &'a [Expression]) -> Option<Typed> {
         let [of, by] = arguments else {
             return self.error(&name.span, "`gradient` takes a scalar and a point or parameter, as in gradient(θ, x1)");

@@ -17,6 +17,7 @@ mod vanishing;
 pub use typed::{Binding, Input, Program, Source, Typed, TypedKind};
 pub use units::unit_exponents;
 
+use crate::budget::{Budget, Phase};
 use crate::diagnostic::Diagnostics;
 use crate::syntax::{Declaration, Item, UserFunction};
 use constant::Globals;
@@ -26,12 +27,13 @@ use signature::Signature;
 
 /// Checks all declarations. A broken one yields its errors and a stub with the same inputs and value zero, so that code
 /// which uses it causes no further errors.
-pub fn check(items: &[Item], diagnostics: &mut Diagnostics) -> Vec<Program> {
+pub fn check(items: &[Item], budget: &Budget, diagnostics: &mut Diagnostics) -> Vec<Program> {
+    budget.enter(Phase::Checking);
     let unused = check_names(items, diagnostics);
     let functions: Vec<&UserFunction> =
         items.iter().filter_map(|i| if let Item::Function(f) = i { Some(f) } else { None }).collect();
     let constants = items.iter().filter_map(|i| if let Item::Constant(c) = i { Some(c) } else { None });
-    let globals = Globals::of(constants, diagnostics);
+    let globals = Globals::of(constants, budget, diagnostics);
     let mut programs: Vec<Program> = Vec::new();
     for item in items {
         let Item::Declaration(declaration) = item else { continue };
@@ -39,12 +41,12 @@ pub fn check(items: &[Item], diagnostics: &mut Diagnostics) -> Vec<Program> {
         if programs.iter().any(|program| program.name == declaration.name.text) {
             continue;
         }
-        let mut program = check_declaration(declaration, &functions, &globals, diagnostics);
+        let mut program = check_declaration(declaration, &functions, &globals, budget, diagnostics);
         program.source = with_what_it_uses(&program.source, item, items);
         programs.push(program);
     }
     if diagnostics.0.is_empty() {
-        diagnostics.0.extend(unused);
+        unused.into_iter().for_each(|unused| diagnostics.push(unused));
     }
     programs
 }
@@ -77,14 +79,17 @@ fn check_declaration(
     declaration: &Declaration,
     functions: &[&UserFunction],
     globals: &Globals,
+    budget: &Budget,
     diagnostics: &mut Diagnostics,
 ) -> Program {
+    let budget = &budget.of_declaration(declaration.limits);
     let signature = Signature::of(declaration, globals, diagnostics);
     domain::check(declaration, &signature, diagnostics);
     let mut own = Diagnostics::default();
     let checked = declaration.body.as_ref().and_then(|body| {
-        let mut checker = Checker::new(&signature, globals, functions, &mut own);
-        let result = checker.body(body, true)?;
+        let mut checker = Checker::new(&signature, globals, functions, budget, &mut own);
+        checker.declaration = &declaration.name.text;
+        let result = checker.body(body, true).and_then(|result| checker.check_depth(result))?;
         checker.report_unused(&declaration.name);
         let bindings = checker.bindings;
         let has_velocities = checker.reads_velocities;
@@ -96,7 +101,7 @@ fn check_declaration(
         own.0.is_empty().then_some((bindings, has_velocities, result))
     });
     let failed = checked.is_none();
-    diagnostics.0.extend(own.0);
+    diagnostics.append(own);
     let (bindings, has_velocities, result) = checked
         .unwrap_or_else(|| (Vec::new(), false, result::stub(declaration.kind, &signature, &declaration.name.span)));
     let program = Program {
@@ -117,12 +122,14 @@ fn check_declaration(
         has_velocities,
         bindings,
         result,
+        limits: declaration.limits,
+        budget: budget.clone(),
     };
     let mut own = Diagnostics::default();
     if !failed {
         units::check(&program, &mut own);
     }
     let failed = failed || !own.0.is_empty();
-    diagnostics.0.extend(own.0);
+    diagnostics.append(own);
     if failed { program.without_audit() } else { program }
 }

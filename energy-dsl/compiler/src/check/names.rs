@@ -68,8 +68,15 @@ impl Role {
 
 struct Entry<'a> {
     name: &'a Name,
+    canonical: String,
     role: Role,
     used: bool,
+}
+
+impl<'a> Entry<'a> {
+    fn new(name: &'a Name, role: Role, used: bool) -> Self {
+        Self { name, canonical: name.canonical(), role, used }
+    }
 }
 
 struct Names<'a, 'd> {
@@ -83,7 +90,7 @@ impl<'a> Names<'a, '_> {
     fn declaration(&mut self, declaration: &'a Declaration) {
         let inputs = declaration.inputs.iter().flat_map(|group| &group.names);
         // The signature reports inputs that are declared twice.
-        self.scopes.push(inputs.map(|name| Entry { name, role: Role::Input, used: true }).collect());
+        self.scopes.push(inputs.map(|name| Entry::new(name, Role::Input, true)).collect());
         if let Some(body) = &declaration.body {
             self.body(body);
         }
@@ -156,12 +163,12 @@ impl<'a> Names<'a, '_> {
 
     fn read(&mut self, name: &Name) {
         let mut canonical = name.canonical();
-        if self.find(|entry| entry.name.canonical() == canonical).is_none()
+        if self.find(|entry| entry.canonical == canonical).is_none()
             && let Some(plain) = without_hat(&name.text)
         {
             canonical = Name { text: plain, span: name.span.clone() }.canonical();
         }
-        if let Some(entry) = self.find(|e| e.role != Role::Function && e.name.canonical() == canonical) {
+        if let Some(entry) = self.find(|e| e.role != Role::Function && e.canonical == canonical) {
             entry.used = true;
         }
     }
@@ -174,7 +181,7 @@ impl<'a> Names<'a, '_> {
 
     fn define(&mut self, name: &'a Name, role: Role) {
         self.report_hidden(name, role);
-        self.scopes.last_mut().expect("compiler bug: no scope").push(Entry { name, role, used: false });
+        self.scopes.last_mut().expect("compiler bug: no scope").push(Entry::new(name, role, false));
     }
 
     /// Reports a definition that hides another name. Only a value may replace an earlier value.
@@ -189,14 +196,13 @@ impl<'a> Names<'a, '_> {
             return;
         }
         let canonical = name.canonical();
-        let same =
-            self.scopes.last().and_then(|own| own.iter().find(|e| e.role == role && e.name.canonical() == canonical));
+        let same = self.scopes.last().and_then(|own| own.iter().find(|e| e.role == role && e.canonical == canonical));
         if let Some(first) = same.map(|entry| entry.name)
             && role != Role::Value
         {
             return self.report_twice(name, first);
         }
-        let Some(hidden) = self.find(|entry| entry.name.canonical() == canonical) else { return };
+        let Some(hidden) = self.find(|entry| entry.canonical == canonical) else { return };
         if (role, hidden.role) == (Role::Value, Role::Value) || (role, hidden.role) == (Role::Variable, Role::Value) {
             return;
         }
@@ -213,7 +219,7 @@ impl<'a> Names<'a, '_> {
 
     /// Leaves a scope, and notes what nothing has used there.
     fn close(&mut self) {
-        for Entry { name, role, used } in self.scopes.pop().unwrap_or_default() {
+        for Entry { name, role, used, .. } in self.scopes.pop().unwrap_or_default() {
             if used || !matches!(role, Role::Function | Role::Value) || name.text.starts_with('_') {
                 continue;
             }

@@ -10,14 +10,19 @@ use energy_runtime::Kind;
 
 /// Returns a zero result of the kind.
 pub(super) fn stub(kind: Kind, signature: &Signature, span: &Span) -> Typed {
-    let zero = constant(0.0, span);
     if kind != Kind::Force {
-        return zero;
+        return constant(0.0, span);
     }
+    no_forces(signature.moving.len(), span)
+}
+
+/// Returns a zero force on each point.
+pub(super) fn no_forces(points: usize, span: &Span) -> Typed {
+    let zero = constant(0.0, span);
     let vector = functions::find("vector").expect("compiler bug: no function `vector`");
     let shape = Shape::Vector(3);
     let null = Typed { kind: TypedKind::Call(vector, vec![zero; 3]), shape, span: span.clone() };
-    rows(vec![null; signature.moving.len()], span)
+    rows(vec![null; points], span)
 }
 
 /// Concatenates values.

@@ -18,6 +18,7 @@ pub(super) struct Signature {
 #[derive(Clone)]
 pub(super) struct InputName {
     pub(super) name: Name,
+    pub(super) canonical: String,
     pub(super) source: Source,
     pub(super) first: usize,
     /// Shape of the input, or of the entries of the array.
@@ -59,8 +60,9 @@ impl Signature {
                     format!("this {} cannot depend on velocities; declare a force", declaration.kind.keyword()),
                 ));
             }
-            let input_type = input_type(group, globals, diagnostics);
-            for name in &group.names {
+            let input_type = input_type(group, &declaration.name.text, globals, diagnostics);
+            // Each has at least one number, so that this error is certain.
+            for name in group.names.iter().take(MOST_NUMBERS + 1 - signature.names.len().min(MOST_NUMBERS)) {
                 signature.add(name, group.section, input_type, &group.unit, &mut velocities, diagnostics);
             }
         }
@@ -118,7 +120,7 @@ impl Signature {
         diagnostics: &mut Diagnostics,
     ) {
         let canonical = name.canonical();
-        let clash = self.names.iter().find(|n| n.name.canonical() == canonical);
+        let clash = self.names.iter().find(|n| n.canonical == canonical);
         if let Some(other) = clash {
             let message = if other.name.text == name.text {
                 format!("the name `{}` is declared twice", name.text)
@@ -158,7 +160,7 @@ impl Signature {
             }
             (source, first)
         };
-        self.names.push(InputName { name: name.clone(), source, first, shape, length });
+        self.names.push(InputName { name: name.clone(), canonical, source, first, shape, length });
     }
 }
 
@@ -169,10 +171,11 @@ const MOST_NUMBERS: usize = 4096;
 const MOST_COORDINATES: usize = 255;
 
 /// Returns the type of a group of inputs. An array with an invalid length gets length one.
-fn input_type(group: &InputGroup, globals: &Globals, diagnostics: &mut Diagnostics) -> InputType {
+fn input_type(group: &InputGroup, declaration: &str, globals: &Globals, diagnostics: &mut Diagnostics) -> InputType {
     let length = group.length.as_ref().map(|length| {
         let signature = Signature::empty();
-        let mut checker = Checker::new(&signature, globals, &[], diagnostics);
+        let mut checker = Checker::new(&signature, globals, &[], &globals.budget, diagnostics);
+        checker.declaration = declaration;
         checker.array_length(&group.names[0], length).unwrap_or(1)
     });
     InputType { element: group.element, length }

@@ -1,4 +1,5 @@
-use crate::diagnostic::Span;
+use crate::budget::{Budget, Limits, Stop};
+use crate::diagnostic::{Diagnostic, Span};
 use crate::functions::{Function, Shape};
 use crate::syntax::{AuditScope, InputType, Unit};
 use energy_runtime::{Kind, Property};
@@ -40,9 +41,42 @@ pub struct Program {
     pub bindings: Vec<Binding>,
     /// Result of the body.
     pub result: Typed,
+    /// Limits of its own; `None` for those of the text.
+    pub limits: Option<Limits>,
+    /// Pays for compiling it.
+    pub budget: Budget,
 }
 
 impl Program {
+    /// Returns the error of a compilation that was stopped, at the statement that grew.
+    #[must_use]
+    pub(crate) fn stopped(&self, stop: Stop) -> Diagnostic {
+        let what = &self.name;
+        let place = |binding: usize| self.bindings.get(binding).map(|binding| binding.value.span.clone());
+        if let Some(span) = self.budget.binding().and_then(place) {
+            return stop.diagnostic(&self.budget, &span, what);
+        }
+        let diagnostic = stop.diagnostic(&self.budget, &self.span, what);
+        let largest = self.budget.largest().and_then(|(binding, size)| Some((size, place(binding)?)));
+        match largest {
+            Some((size, span)) => diagnostic.see((format!("the largest statement has {size} operations"), span)),
+            None => diagnostic,
+        }
+    }
+
+    /// Returns the same declaration with the value 0, and a budget of its own. Code that uses a declaration which was
+    /// stopped then causes no further errors.
+    #[must_use]
+    pub(crate) fn stub(&self) -> Self {
+        let zero = |span: &Span| super::expression::constant(0.0, span);
+        let result = match self.kind {
+            Kind::Force => super::result::no_forces(self.points(), &self.span),
+            _ => zero(&self.span),
+        };
+        let stub = Self { bindings: Vec::new(), result, budget: Budget::new(Limits::NONE), ..self.clone() };
+        stub.without_audit()
+    }
+
     /// Returns the number of points of a declaration whose moving inputs are points.
     #[must_use]
     pub fn points(&self) -> usize {
@@ -98,6 +132,10 @@ pub struct Binding {
     pub rest: bool,
     /// Unit of a constant's value.
     pub unit: Option<Unit>,
+    /// The number that the value equals; `None` if it is not constant.
+    pub constant: Option<f64>,
+    /// Number of nested expressions, through other bindings too.
+    pub depth: usize,
 }
 
 /// The section of inputs that a value is read from.

@@ -53,6 +53,7 @@ fn moving_operands(graph: &Graph, node: NodeId, order: Order) -> Vec<NodeId> {
 
 /// Adds a term to the sum at an index.
 fn accumulate<P: Ord>(g: &mut Graph, sums: &mut BTreeMap<P, NodeId>, place: P, term: NodeId) {
+    g.budget().spend(1, 0);
     let sum = match sums.get(&place) {
         Some(&sum) => g.accumulate(sum, term),
         None => term,

@@ -6,14 +6,20 @@ use super::methods::component;
 use super::repeated;
 use super::schedule::Schedule;
 use super::traits::traits;
+use crate::budget::Phase;
 use crate::check::{Input as DeclaredInput, Program};
 use crate::graph::Input;
 use crate::routines::Routines;
 use energy_runtime::Kind;
 
+/// Bytes of the tokens that any declaration has.
+const DECLARATION_BYTES: u64 = 600_000;
+
 /// Emits the type, its constructor, its traits, and the audit test if requested.
 #[must_use]
 pub fn emit(program: &Program, routines: &Routines) -> TokenStream {
+    program.budget.enter(Phase::Writing);
+    program.budget.spend(1000, DECLARATION_BYTES);
     let name = format_ident!("{}", program.name, span = program.span.token);
     let structure = structure(&name, program, routines);
     let constructor = constructor(&name, program, routines);

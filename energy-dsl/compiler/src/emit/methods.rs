@@ -13,6 +13,7 @@ use quote::{format_ident, quote};
 
 use super::repeated::{self, term_of};
 use super::schedule::Schedule;
+use crate::budget::Budget;
 use crate::check::{Input as DeclaredInput, Program};
 use crate::graph::{Graph, Input, NodeId};
 use crate::routines::{General, Routine, Routines};
@@ -262,11 +263,10 @@ fn with_care(
     let outputs = method.fields.iter().zip(&general.groups).map(|((field, layout), nodes)| {
         let field = format_ident!("{field}");
         // The layout of consecutive numbers.
-        let mut graph = Graph::textbook();
+        let mut graph = Graph::textbook().paid_by(routines.graph.budget());
         let places = first..first + nodes.len();
         first = places.end;
-        let places: Vec<NodeId> =
-            places.map(|i| graph.input(Input::Precomputed(u16::try_from(i).expect("few numbers")))).collect();
+        let places: Vec<NodeId> = places.map(|i| graph.input(Input::Precomputed(Budget::input_number(i)))).collect();
         let read = |input: Input| {
             let Input::Precomputed(number) = input else { unreachable!("compiler bug: numbers only") };
             let number = usize::from(number);

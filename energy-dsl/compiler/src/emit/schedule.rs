@@ -24,6 +24,9 @@ pub(super) struct Schedule<'a> {
 /// routines are split into blocks that return what later ones read.
 const BLOCK: usize = 128;
 
+/// Bytes of the tokens of a statement.
+const STATEMENT_BYTES: u64 = 1000;
+
 impl<'a> Schedule<'a> {
     pub(super) fn new(graph: &'a Graph, read: Reader<'a>) -> Self {
         Self { sequence: Sequence::new(graph), read, names: Vec::new(), computed: 0, returned: Vec::new() }
@@ -48,6 +51,7 @@ impl<'a> Schedule<'a> {
     }
 
     fn lets(&self, places: &[usize]) -> TokenStream {
+        self.sequence.budget().spend(2 * places.len() as u64, STATEMENT_BYTES * places.len() as u64);
         let list = self.sequence.statements().list();
         places
             .iter()

@@ -117,7 +117,9 @@ fn reduced_potential(name: &Ident, program: &Program, routines: &Routines) -> To
     let triangle_blocks: Vec<TokenStream> = pairs
         .zip(expansion.triangle.chunks(9))
         .map(|((i, j), block)| {
-            let free = (1u32 << i) | (1u32 << j);
+            // The mask has 32 points. Blocks of others are always expanded.
+            let bit = |point: usize| 1_u32.checked_shl(point as u32).unwrap_or(0);
+            let free = bit(i) | bit(j);
             let block = schedule.vectors(block);
             quote!(if FREE & #free == #free { #block } else { [[T::from_f64(0.0); 3]; 3] })
         })

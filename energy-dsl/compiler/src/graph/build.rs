@@ -7,8 +7,12 @@ use super::recognise::Ending;
 use super::{Form, Graph, Input, NodeId, Op};
 use energy_runtime::Number;
 
+/// Bytes of a node in all tables of a graph, which double in size as they grow.
+const NODE_BYTES: u64 = 150;
+
 impl Graph {
     pub(crate) fn push(&mut self, op: Op, varies: bool) -> NodeId {
+        self.budget().spend(1, NODE_BYTES);
         let id = NodeId(u32::try_from(self.nodes.len()).expect("fewer than 2³² nodes"));
         for operand in op.operands() {
             self.users[operand.0 as usize] += 1;
@@ -21,6 +25,7 @@ impl Graph {
 
     pub(super) fn node(&mut self, op: Op) -> NodeId {
         if let Some(&id) = self.index.get(&op) {
+            self.budget().spend(1, 0);
             return id;
         }
         let varies = match op {

@@ -11,6 +11,7 @@ pub fn reachable(graph: &Graph, outputs: &[NodeId]) -> Vec<NodeId> {
             stack.extend(graph.fused(node).operands().map(|o| graph.resolve(o)));
         }
     }
+    graph.budget().spend(graph.len() as u64 / 8, 0);
     (0..).zip(is_needed).filter(|(_, is_needed)| *is_needed).map(|(number, _)| NodeId(number)).collect()
 }
 

@@ -30,6 +30,8 @@ pub(crate) use substitute::Substitution;
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use crate::budget::{Budget, Limits};
+
 use rustc_hash::FxHashMap;
 
 /// The form that functions are lowered to.
@@ -71,6 +73,8 @@ pub struct Graph {
     compensated: bool,
     /// Parameters that the formula differentiates by.
     varied: BTreeSet<Input>,
+    /// Pays for nodes and for passes over them.
+    budget: Budget,
 }
 
 impl Graph {
@@ -105,7 +109,19 @@ impl Graph {
             outward: false,
             compensated: true,
             varied: BTreeSet::new(),
+            budget: Budget::new(Limits::NONE),
         }
+    }
+
+    /// Sets the budget that pays for nodes. Otherwise there are no limits.
+    #[must_use]
+    pub fn paid_by(self, budget: &Budget) -> Self {
+        Self { budget: budget.clone(), ..self }
+    }
+
+    /// Returns the budget.
+    pub(crate) fn budget(&self) -> &Budget {
+        &self.budget
     }
 
     /// Makes an input vary, so that nodes can be differentiated by it. Call it before the input is used.

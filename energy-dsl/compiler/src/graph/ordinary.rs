@@ -4,6 +4,8 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use rustc_hash::FxHashMap;
+
 use super::{Graph, NodeId, Op};
 
 /// If `guard` holds, evaluated under the assumptions themselves, `node` equals `instead`.
@@ -63,15 +65,15 @@ pub fn ordinary(g: &mut Graph, outputs: &[NodeId]) -> Option<(Vec<NodeId>, NodeI
 /// A rebuilt copy of some expressions.
 #[derive(Default)]
 pub(super) struct Path {
-    assumptions: BTreeMap<NodeId, Assumption>,
+    assumptions: FxHashMap<NodeId, Assumption>,
     /// The copy of each node.
-    done: BTreeMap<NodeId, NodeId>,
+    done: FxHashMap<NodeId, NodeId>,
     guards: BTreeSet<NodeId>,
 }
 
 impl Path {
     /// Replaces some nodes by others.
-    pub(super) fn replacing(done: BTreeMap<NodeId, NodeId>) -> Self {
+    pub(super) fn replacing(done: FxHashMap<NodeId, NodeId>) -> Self {
         Self { done, ..Self::default() }
     }
 
@@ -102,6 +104,7 @@ impl Path {
             let needed = self.needed(g, next);
             let missing: Vec<NodeId> = needed.into_iter().filter(|o| !self.done.contains_key(o)).collect();
             if missing.is_empty() {
+                g.budget().spend(1, 0);
                 let rebuilt = self.simplify(g, next);
                 self.done.insert(next, rebuilt);
                 stack.pop();

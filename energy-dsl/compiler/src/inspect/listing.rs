@@ -2,6 +2,7 @@ use std::fmt::Write as _;
 
 use proc_macro2::TokenStream;
 
+use crate::budget::Budget;
 use crate::check::Program;
 use crate::diagnostic::Diagnostics;
 use crate::emit::emit;
@@ -42,7 +43,7 @@ impl Listing {
     /// # Errors
     /// Whatever is wrong with the text.
     pub fn from_source(source: &str) -> Result<Vec<Self>, Diagnostics> {
-        programs(source).map(Self::of)
+        Self::of(&programs(source, &Budget::default())?)
     }
 
     /// Compiles the declarations in the text of a file.
@@ -50,15 +51,24 @@ impl Listing {
     /// # Errors
     /// Whatever is wrong with the text, at its places in the file.
     pub fn from_file(text: &str, file: &str) -> Result<Vec<Self>, Diagnostics> {
-        file_programs(text, file).map(Self::of)
+        Self::from_file_within(text, file, &Budget::default())
     }
 
-    fn of(programs: Vec<Program>) -> Vec<Self> {
-        let listing = |program| {
+    /// Compiles the declarations in the text of a file within a budget.
+    ///
+    /// # Errors
+    /// Whatever is wrong with the text, and a budget that is spent.
+    pub fn from_file_within(text: &str, file: &str, budget: &Budget) -> Result<Vec<Self>, Diagnostics> {
+        Self::of(&file_programs(text, file, budget)?)
+    }
+
+    fn of(programs: &[Program]) -> Result<Vec<Self>, Diagnostics> {
+        let listing = |program: &Program| {
             let routines = differentiate(program, lower(program));
             Self { name: program.name.clone(), code: emit(program, &routines), routines }
         };
-        programs.iter().map(listing).collect()
+        let within = |program: &Program| program.budget.within(|| listing(program));
+        programs.iter().map(|program| within(program).map_err(|stop| program.stopped(stop).into())).collect()
     }
 
     /// Returns the name of the declaration.

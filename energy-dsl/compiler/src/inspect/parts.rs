@@ -31,7 +31,7 @@ pub struct Parts {
 impl Parts {
     /// Takes a program apart; `None` if it contains derivatives or is too large.
     pub(super) fn of(program: &Program) -> Option<Self> {
-        let (graph, lowered) = lower_parts(program)?;
+        let (graph, lowered) = program.budget.within(|| lower_parts(program)).ok()??;
         let names = names(program);
         let writer = Writer { program, names: &names };
         let part = |part: &LoweredPart<'_>| Part {

@@ -1,12 +1,13 @@
 use proc_macro2::TokenStream;
 
+use crate::budget::Budget;
 use crate::check::{Program, Source, check};
 use crate::diagnostic::{Diagnostic, Diagnostics, Span};
 use crate::graph::{Interpreter, NodeId};
 use crate::inspect::parts::Parts;
 use crate::inspect::tower::Tower;
 use crate::lower::{TextbookFormula, lower_textbook};
-use crate::syntax::{parse, parse_file};
+use crate::syntax::{check_size, parse, parse_file};
 use energy_runtime::{Inputs, Number};
 
 /// A declaration in its textbook form, without robust primitives and rewrites. It can be evaluated over any number
@@ -45,11 +46,12 @@ impl Textbook {
     /// # Errors
     /// Whatever is wrong with the text.
     pub fn from_source(source: &str) -> Result<Self, Diagnostics> {
-        let program = programs(source)?.into_iter().next().ok_or_else(|| {
+        let program = programs(source, &Budget::default())?.into_iter().next().ok_or_else(|| {
             let here = Span::of(proc_macro2::Span::call_site());
             Diagnostics::from(Diagnostic::new(&here, "expected a declaration, found none"))
         })?;
-        let TextbookFormula { formula, gradients } = lower_textbook(&program);
+        let lowered = program.budget.within(|| lower_textbook(&program));
+        let TextbookFormula { formula, gradients } = lowered.map_err(|stop| program.stopped(stop))?;
         let interpreter = |outputs: &[NodeId]| Interpreter::new(&formula.graph, outputs);
         let inner = gradients.iter().map(|(of, ..)| *of);
         let everything: Vec<NodeId> = formula.outputs.iter().copied().chain(inner).collect();
@@ -167,11 +169,12 @@ impl<T: Number> TowerInputs<T> {
 ///
 /// # Errors
 /// Everything that is wrong with it.
-pub fn programs(source: &str) -> Result<Vec<Program>, Diagnostics> {
+pub fn programs(source: &str, budget: &Budget) -> Result<Vec<Program>, Diagnostics> {
     let mut diagnostics = Diagnostics::default();
+    check_size(source, "the text", &Span::of(proc_macro2::Span::call_site()))?;
     let stream: TokenStream = source.parse().map_err(|_| not_tokens(source))?;
     let items = parse(stream, &mut diagnostics);
-    let programs = check(&items, &mut diagnostics);
+    let programs = check(&items, budget, &mut diagnostics);
     diagnostics.finish(programs)
 }
 
@@ -193,10 +196,10 @@ fn not_tokens(source: &str) -> Diagnostics {
 ///
 /// # Errors
 /// Everything that is wrong with it.
-pub fn file_programs(text: &str, file: &str) -> Result<Vec<Program>, Diagnostics> {
+pub fn file_programs(text: &str, file: &str, budget: &Budget) -> Result<Vec<Program>, Diagnostics> {
     let mut diagnostics = Diagnostics::default();
     let here = Span::of(proc_macro2::Span::call_site());
     let items = parse_file(text, file, &here, &mut diagnostics);
-    let programs = check(&items, &mut diagnostics);
+    let programs = check(&items, budget, &mut diagnostics);
     diagnostics.finish(programs)
 }

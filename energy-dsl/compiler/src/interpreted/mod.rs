@@ -14,6 +14,7 @@ mod outputs;
 
 use std::sync::Arc;
 
+use crate::budget::{Budget, Phase};
 use crate::check::Program;
 use crate::diagnostic::{Diagnostic, Diagnostics};
 use crate::inspect::{file_programs, programs};
@@ -69,7 +70,15 @@ impl Interpreted {
     /// # Errors
     /// Whatever is wrong with the text.
     pub fn from_source(source: &str) -> Result<Vec<Self>, Diagnostics> {
-        Self::compiled(&programs(source)?)
+        Self::from_source_within(source, &Budget::default())
+    }
+
+    /// Compiles the declarations of a text within a budget, which can also watch and end the compilation.
+    ///
+    /// # Errors
+    /// Whatever is wrong with the text, and a budget that is spent.
+    pub fn from_source_within(source: &str, budget: &Budget) -> Result<Vec<Self>, Diagnostics> {
+        Self::compiled(&programs(source, budget)?)
     }
 
     /// Compiles the declarations in the text of a file.
@@ -77,7 +86,15 @@ impl Interpreted {
     /// # Errors
     /// Whatever is wrong with the text, at its places in the file.
     pub fn from_file(text: &str, file: &str) -> Result<Vec<Self>, Diagnostics> {
-        Self::compiled(&file_programs(text, file)?)
+        Self::from_file_within(text, file, &Budget::default())
+    }
+
+    /// Compiles the declarations in the text of a file within a budget, which can also watch and end the compilation.
+    ///
+    /// # Errors
+    /// Whatever is wrong with the text, at its places in the file, and a budget that is spent.
+    pub fn from_file_within(text: &str, file: &str, budget: &Budget) -> Result<Vec<Self>, Diagnostics> {
+        Self::compiled(&file_programs(text, file, budget)?)
     }
 
     /// Compiles programs whose claims an audit may check.
@@ -85,11 +102,19 @@ impl Interpreted {
         let mut diagnostics = Diagnostics::default();
         let mut elements = Vec::with_capacity(programs.len());
         for program in programs {
-            let routines = differentiate(program, lower(program));
-            prove(program, &routines, true, &mut diagnostics);
-            match Self::new(program, &routines) {
-                Ok(element) => elements.push(element),
-                Err(TooLarge) => {
+            let compiled = program.budget.within(|| {
+                let routines = differentiate(program, lower(program));
+                prove(program, &routines, true, &mut diagnostics);
+                program.budget.enter(Phase::Writing);
+                Self::new(program, &routines)
+            });
+            match compiled {
+                Ok(Ok(element)) => elements.push(element),
+                Err(stop) => {
+                    diagnostics.push(program.stopped(stop));
+                    break;
+                }
+                Ok(Err(TooLarge)) => {
                     let message = format!("{} has too many numbers to be read at run time", program.name);
                     let help = "declare it with `energy!` in Rust, or split it into several energies";
                     diagnostics.push(Diagnostic::new(&program.span, message).help(help));

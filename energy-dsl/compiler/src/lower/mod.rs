@@ -13,6 +13,7 @@ pub use repeated::Repetition;
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 
+use crate::budget::{Budget, Phase};
 use crate::check::{Program, Source, Typed, TypedKind};
 use crate::diff::{Coordinates, Moving, Order, first_derivatives};
 use crate::functions::{Lowered, RECOGNISERS, Shape};
@@ -48,6 +49,7 @@ const LEAST_COST_OF_LOOPS: usize = 1000;
 /// Lowers to the robust form, split into the part that the rest shape determines and the part that moves.
 #[must_use]
 pub fn lower(program: &Program) -> (RestFormula, Formula) {
+    program.budget.enter(Phase::Lowering);
     let declared = stored_bindings(program);
     let program = &rest::with_constant_parts_stored(program);
     let mut rest = Lowering::new(program, Form::Robust, None);
@@ -168,6 +170,8 @@ struct Lowering<'a> {
     /// Derivatives that the evaluation of the textbook form must supply.
     gradients: Vec<(NodeId, Source, usize)>,
     spectral: Spectral,
+    /// Number of nodes of the bindings that the current one reads.
+    nested: usize,
 }
 
 impl<'a> Lowering<'a> {
@@ -175,14 +179,23 @@ impl<'a> Lowering<'a> {
         let mut graph = match form {
             Form::Robust => Graph::robust(RECOGNISERS),
             Form::Textbook => Graph::textbook(),
-        };
+        }
+        .paid_by(&program.budget);
         graph.compensate(!program.uncompensated);
         differentiated_parameters(program).into_iter().for_each(|number| graph.vary(Input::Parameter(number)));
-        Self { program, graph, done: BTreeMap::new(), slots, gradients: Vec::new(), spectral: Spectral::default() }
+        Self {
+            program,
+            graph,
+            done: BTreeMap::new(),
+            slots,
+            gradients: Vec::new(),
+            spectral: Spectral::default(),
+            nested: 0,
+        }
     }
 
     fn inputs(&mut self, shape: Shape, first: usize, input: fn(u16) -> Input) -> Lowered {
-        let number = |i: usize| u16::try_from(first + i).expect("fewer than 65536 inputs");
+        let number = |i: usize| Budget::input_number(first + i);
         Lowered { shape, parts: (0..shape.size()).map(|i| self.graph.input(input(number(i)))).collect() }
     }
 
@@ -192,10 +205,17 @@ impl<'a> Lowering<'a> {
         }
         let binding = &self.program.bindings[number];
         let slot = self.slots.as_ref().filter(|_| binding.rest).map(|slots| slots[&number]);
+        let budget = &self.program.budget;
+        let (within, before) = (budget.at_binding(Some(number)), self.graph.len());
+        let outer = std::mem::take(&mut self.nested);
         let value = match slot {
             Some(slot) => self.stored(binding.value.shape, slot),
             None => self.expression(&binding.value),
         };
+        let operations = self.graph.len() - before;
+        budget.note(number, operations - self.nested);
+        self.nested = outer + operations;
+        budget.at_binding(within);
         self.done.insert(number, value.clone());
         value
     }
@@ -226,6 +246,7 @@ impl<'a> Lowering<'a> {
     }
 
     fn expression(&mut self, expression: &Typed) -> Lowered {
+        self.program.budget.spend(1, 0);
         match &expression.kind {
             TypedKind::Constant(value) => Lowered::scalar(self.graph.constant(*value)),
             TypedKind::Pi => Lowered::scalar(self.graph.pi()),
@@ -270,7 +291,7 @@ impl<'a> Lowering<'a> {
                 self.gradients.push((of, source, by));
                 self.gradients.len() - 1
             });
-            self.graph.input(Input::Precomputed(u16::try_from(number).expect("fewer than 65536 inputs")))
+            self.graph.input(Input::Precomputed(Budget::input_number(number)))
         };
         numbers.map(derivative).collect()
     }
@@ -301,14 +322,20 @@ fn input_of(source: Source) -> fn(u16) -> Input {
 
 /// Returns the parameter numbers that a program differentiates by.
 fn differentiated_parameters(program: &Program) -> BTreeSet<u16> {
-    fn visit(typed: &Typed, found: &mut BTreeSet<u16>) {
+    fn visit(program: &Program, typed: &Typed, found: &mut BTreeSet<u16>) {
+        program.budget.spend(1, 0);
         if let TypedKind::Gradient(_, Source::Parameter, first) = &typed.kind {
             let number = |i: usize| u16::try_from(first + i).expect("fewer than 65536 inputs");
             found.extend((0..typed.shape.size()).map(number));
         }
-        typed.parts().into_iter().for_each(|part| visit(part, found));
+        typed.parts().into_iter().for_each(|part| visit(program, part, found));
     }
     let mut found = BTreeSet::new();
-    program.bindings.iter().map(|binding| &binding.value).chain([&program.result]).for_each(|t| visit(t, &mut found));
+    program
+        .bindings
+        .iter()
+        .map(|binding| &binding.value)
+        .chain([&program.result])
+        .for_each(|t| visit(program, t, &mut found));
     found
 }

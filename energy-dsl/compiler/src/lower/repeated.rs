@@ -1,7 +1,7 @@
 //! Recognises energies that are sums of like terms, such as sums over quadrature points. The terms differ in stored
 //! numbers and constants only, so that one body in a loop computes all of them.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use super::Lowering;
 use crate::check::{Binding, Program, Source, Typed, TypedKind};
@@ -46,6 +46,8 @@ struct Unifier<'a> {
     terms: usize,
     stored: Vec<(usize, Vec<usize>)>,
     constants: Vec<(usize, Vec<Vec<f64>>)>,
+    /// Whether each binding is fixed, as far as it is known.
+    fixed: BTreeMap<usize, bool>,
     /// The binding of the term that stands for these, one for each term.
     known: BTreeMap<Vec<usize>, usize>,
 }
@@ -53,7 +55,8 @@ struct Unifier<'a> {
 impl<'a> Unifier<'a> {
     fn new(program: &'a Program) -> Self {
         let bindings = program.bindings.clone();
-        Self { program, bindings, terms: 0, stored: Vec::new(), constants: Vec::new(), known: BTreeMap::new() }
+        let (stored, constants) = (Vec::new(), Vec::new());
+        Self { program, bindings, terms: 0, stored, constants, fixed: BTreeMap::new(), known: BTreeMap::new() }
     }
 
     /// Returns the term of a sum, with the factors of the sum.
@@ -79,14 +82,20 @@ impl<'a> Unifier<'a> {
     }
 
     /// Returns whether an expression is a scalar that does not depend on positions.
-    fn is_fixed(&self, typed: &Typed) -> bool {
+    fn is_fixed(&mut self, typed: &Typed) -> bool {
         typed.shape == Shape::Scalar
             && match &typed.kind {
                 TypedKind::Constant(_) | TypedKind::Pi => true,
                 TypedKind::Input(source, _) => *source == Source::Parameter,
                 TypedKind::Binding(number) => {
-                    let binding = &self.program.bindings[*number];
-                    binding.rest || self.is_fixed(&binding.value)
+                    let (number, program) = (*number, self.program);
+                    if let Some(&known) = self.fixed.get(&number) {
+                        return known;
+                    }
+                    let binding = &program.bindings[number];
+                    let fixed = binding.rest || self.is_fixed(&binding.value);
+                    self.fixed.insert(number, fixed);
+                    fixed
                 }
                 TypedKind::Call(_, list) => list.iter().all(|part| self.is_fixed(part)),
                 _ => false,
@@ -119,6 +128,7 @@ impl<'a> Unifier<'a> {
     /// Returns one expression for expressions that differ in stored and constant numbers only.
     fn unified(&mut self, terms: &[&Typed]) -> Option<Typed> {
         let first = terms[0];
+        self.program.budget.spend(terms.len() as u64, 0);
         if terms.iter().any(|term| term.shape != first.shape) {
             return None;
         }
@@ -175,8 +185,9 @@ impl<'a> Unifier<'a> {
 
     /// Returns the numbers of an expression without inputs.
     fn literal(&self, typed: &Typed) -> Option<Vec<f64>> {
-        let mut stack = vec![typed];
+        let (mut stack, mut seen) = (vec![typed], BTreeSet::new());
         while let Some(part) = stack.pop() {
+            self.program.budget.spend(1, 0);
             match &part.kind {
                 TypedKind::Input(..) | TypedKind::Gradient(..) => return None,
                 TypedKind::Binding(number) => {
@@ -184,7 +195,9 @@ impl<'a> Unifier<'a> {
                     if binding.rest {
                         return None;
                     }
-                    stack.push(&binding.value);
+                    if seen.insert(*number) {
+                        stack.push(&binding.value);
+                    }
                 }
                 _ => stack.extend(part.parts()),
             }
@@ -241,7 +254,7 @@ impl<'a> Unifier<'a> {
     }
 
     fn add(&mut self, value: Typed, rest: bool) -> usize {
-        self.bindings.push(Binding { value, rest, unit: None });
+        self.bindings.push(Binding { value, rest, unit: None, constant: None, depth: 0 });
         self.bindings.len() - 1
     }
 }

@@ -138,7 +138,7 @@ impl<'a> Mover<'a> {
         let next = self.program.bindings.len() + self.moved.len();
         let number = *self.known.entry(parts).or_insert(next);
         if number == next {
-            self.moved.push(Binding { value: typed.clone(), rest: true, unit: None });
+            self.moved.push(Binding { value: typed.clone(), rest: true, unit: None, constant: None, depth: 0 });
         }
         Some(number)
     }

@@ -6,6 +6,9 @@ mod hazards;
 mod magnitude;
 mod range;
 
+use rustc_hash::FxHashMap;
+
+use crate::budget::{Budget, Phase};
 use crate::check::Program;
 use crate::diff::{Coordinates, Moving, Plan, SecondOrder, first_order, hessian_vector, only_dihedral, second_order};
 use crate::graph::{Graph, Input, NodeId, Op, count, general, ordinary, with_signs_inside};
@@ -215,16 +218,15 @@ pub struct Expansion {
 impl Expansion {
     /// Creates the expansion. Numbers that are zero or equal in the reduced routine are so here.
     fn new(g: &Graph, energy: &SecondOrder, coordinates: &Coordinates, points: usize) -> Self {
-        let mut graph = Graph::textbook();
+        let mut graph = Graph::textbook().paid_by(g.budget());
         let all: Vec<NodeId> = energy.gradient.iter().chain(&energy.hessian).map(|&node| g.resolve(node)).collect();
+        let mut first = FxHashMap::default();
         let numbers: Vec<NodeId> = all
             .iter()
-            .map(|&node| match g.as_constant(node) {
+            .enumerate()
+            .map(|(number, &node)| match g.as_constant(node) {
                 Some(value) => graph.constant(value),
-                None => {
-                    let first = all.iter().position(|&other| other == node).expect("it is one of them");
-                    graph.input(Input::Precomputed(u16::try_from(first).expect("few numbers")))
-                }
+                None => graph.input(Input::Precomputed(Budget::input_number(*first.entry(node).or_insert(number)))),
             })
             .collect();
         let (gradient, triangle) = numbers.split_at(energy.gradient.len());
@@ -240,6 +242,7 @@ pub fn differentiate(
     program: &Program,
     (mut rest, Formula { mut graph, outputs, repetition }): (RestFormula, Formula),
 ) -> Routines {
+    program.budget.enter(Phase::Differentiating);
     let refused = refused(&mut rest);
     let g = &mut graph;
     let coordinates = match program.kind {

@@ -1,5 +1,6 @@
 use super::name::Name;
 use super::specialise::Specialisation;
+use crate::budget::Limits;
 use crate::diagnostic::Span;
 use energy_runtime::{Kind, Property};
 
@@ -73,6 +74,8 @@ pub struct Declaration {
     pub properties: Vec<(Property, Span)>,
     /// Whether the declaration has the attribute `#[uncompensated]`.
     pub uncompensated: bool,
+    /// Limits of `#[limits(…)]`; `None` without it.
+    pub limits: Option<Limits>,
     /// Kind of the declaration.
     pub kind: Kind,
     /// Name of the generated type.

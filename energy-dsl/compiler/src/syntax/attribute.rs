@@ -3,6 +3,7 @@
 use super::ast::{AuditRange, AuditScope};
 use super::parse::{Parsed, Parser};
 use super::tokens::{Kind as TokenKind, Token};
+use crate::budget::Limits;
 use crate::diagnostic::{Diagnostic, Span};
 use energy_runtime::Property;
 
@@ -14,11 +15,12 @@ pub(super) struct Attributes {
     pub(super) audit_scope: AuditScope,
     pub(super) properties: Vec<(Property, Span)>,
     pub(super) uncompensated: bool,
+    pub(super) limits: Option<Limits>,
 }
 
 impl Parser<'_> {
     /// Parses an attribute after its `#`: `[doc = "…"]`, `[audit]`, `[audit(samples = n, …)]`, `[invariant(translation,
-    /// rotation)]`, `[rest_state(zero_force)]`, `[even]` or `[uncompensated]`.
+    /// rotation)]`, `[rest_state(zero_force)]`, `[even]`, `[uncompensated]` or `[limits(steps = n, bytes = n)]`.
     pub(super) fn attribute(&mut self, attributes: &mut Attributes) -> Parsed<()> {
         if self.fault().is_none() && !self.is("[") {
             let comment =
@@ -45,11 +47,12 @@ impl Parser<'_> {
             "rest_state" => self.properties(&[("zero_force", Property::ZeroForceAtRest)], attributes)?,
             "even" => attributes.properties.push((Property::Even, name.span)),
             "uncompensated" => attributes.uncompensated = true,
+            "limits" => attributes.limits = Some(self.limits()?),
             other => {
                 return Err(Box::new(Diagnostic::new(&name.span, format!("unknown attribute `{other}`")).help(
                     "a declaration takes doc comments, #[audit], #[audit(samples = 200)], \
                      #[audit(domain(k = 1..10), tolerance = 1e-6)], #[invariant(translation, rotation)], \
-                     #[rest_state(zero_force)], #[even] and #[uncompensated]",
+                     #[rest_state(zero_force)], #[even], #[uncompensated] and #[limits(steps = 1e9, bytes = 2e9)]",
                 )));
             }
         }
@@ -65,7 +68,7 @@ impl Parser<'_> {
         while !self.take(")") {
             let option = self.name("`samples`, `domain` or `tolerance`")?;
             match option.text.as_str() {
-                "samples" => attributes.audit_samples = Some(self.samples()?),
+                "samples" => attributes.audit_samples = Some(self.count("samples")?),
                 "tolerance" => attributes.audit_scope.tolerance = Some(self.tolerance()?),
                 "domain" => self.domain(&mut attributes.audit_scope.ranges)?,
                 other => {
@@ -83,15 +86,37 @@ impl Parser<'_> {
         Ok(())
     }
 
+    /// Parses `(steps = n, bytes = n)`. What is not named keeps its default.
+    fn limits(&mut self) -> Parsed<Limits> {
+        self.expect("(", "before the limits, as in #[limits(steps = 1e9)]")?;
+        let mut limits = Limits::default();
+        while !self.take(")") {
+            let name = self.name("`steps` or `bytes`")?;
+            let limit = match name.text.as_str() {
+                "steps" => &mut limits.steps,
+                "bytes" => &mut limits.bytes,
+                other => {
+                    let message = format!("unknown limit `{other}`; expected `steps = …` or `bytes = …`");
+                    return Err(Box::new(Diagnostic::new(&name.span, message)));
+                }
+            };
+            *limit = self.count(&name.text)? as u64;
+            if !self.take(",") && !self.is(")") {
+                return self.fail("`,` or `)` after a limit");
+            }
+        }
+        Ok(limits)
+    }
+
     /// Parses `= n`.
-    fn samples(&mut self) -> Parsed<usize> {
-        self.expect("=", "after samples")?;
-        let samples = match self.peek() {
+    fn count(&mut self, of: &str) -> Parsed<usize> {
+        self.expect("=", &format!("after {of}"))?;
+        let count = match self.peek() {
             Some(Token { kind: TokenKind::Number(n), .. }) if *n >= 1.0 && n.fract() == 0.0 => *n as usize,
-            _ => return self.fail("the number of samples"),
+            _ => return self.fail(&format!("the number of {of}")),
         };
         self.at += 1;
-        Ok(samples)
+        Ok(count)
     }
 
     /// Parses `= x`. Errors above 1e-3 would pass any derivative.

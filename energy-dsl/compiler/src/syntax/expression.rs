@@ -329,6 +329,7 @@ impl<'a> Parser<'a> {
             bars: Vec::new(),
             depth: self.depth,
             user_functions: self.user_functions.clone(),
+            definitions: 0,
             errors: Vec::new(),
         };
         let body = parser.body(false)?;

@@ -18,4 +18,4 @@ pub use ast::{
 };
 pub use name::{Name, canonical};
 pub(crate) use notation::without_hat;
-pub use parse::{parse, parse_file};
+pub use parse::{check_size, parse, parse_file};

@@ -25,6 +25,7 @@ pub fn canonical(name: &str) -> String {
     for c in name.chars() {
         match c {
             '_' => {}
+            'A'..='Z' | 'a'..='z' | '0'..='9' => plain.push(c),
             'ℓ' => plain.push('l'),
             '₀'..='₉' => plain.push(char::from(b'0' + (c as u32 - '₀' as u32) as u8)),
             _ if subscript_letter(c).is_some() => plain.extend(subscript_letter(c)),

@@ -18,13 +18,40 @@ use energy_runtime::Kind;
 /// Parses all items. After an error in one item, parsing continues with the next.
 pub fn parse(stream: TokenStream, diagnostics: &mut Diagnostics) -> Vec<Item> {
     let tokens = tokens::from_rust(stream);
+    if let Some(beyond) = tokens.get(LARGEST_TEXT) {
+        let message = "this text has more than 262,144 words and signs";
+        diagnostics.push(Diagnostic::new(&beyond.span, message).help("split it into several texts"));
+        return Vec::new();
+    }
     items(&tokens, diagnostics)
 }
 
 /// Parses the text of a file. `at` is the place in Rust code that names the file.
 pub fn parse_file(text: &str, file: &str, at: &Span, diagnostics: &mut Diagnostics) -> Vec<Item> {
+    if let Err(errors) = check_size(text, file, at) {
+        diagnostics.append(errors);
+        return Vec::new();
+    }
     let tokens = text::tokens(text, file, at);
     items(&tokens, diagnostics)
+}
+
+/// Maximum number of definitions in a text.
+const MOST_DEFINITIONS: usize = 4096;
+
+/// Maximum size of a text in bytes. Its tokens take some hundred bytes each.
+const LARGEST_TEXT: usize = 1 << 18;
+
+/// Refuses a text that is too large.
+///
+/// # Errors
+/// The error at the start of the text.
+pub fn check_size(text: &str, file: &str, at: &Span) -> Result<(), Diagnostics> {
+    if text.len() <= LARGEST_TEXT {
+        return Ok(());
+    }
+    let message = format!("{file} has {} bytes, and a text may have 262,144", text.len());
+    Err(Diagnostic::new(at, message).help("split it into several texts").into())
 }
 
 fn items(tokens: &[Token], diagnostics: &mut Diagnostics) -> Vec<Item> {
@@ -34,9 +61,10 @@ fn items(tokens: &[Token], diagnostics: &mut Diagnostics) -> Vec<Item> {
         .filter_map(|pair| if let TokenKind::Name(name) = &pair[1].kind { Some(name.clone()) } else { None })
         .collect();
     let end = tokens.last().map_or_else(|| Span::of(proc_macro2::Span::call_site()), |t| t.span.clone());
-    let mut parser = Parser { tokens, at: 0, end, bars: Vec::new(), depth: 0, user_functions, errors: Vec::new() };
+    let mut parser =
+        Parser { tokens, at: 0, end, bars: Vec::new(), depth: 0, user_functions, definitions: 0, errors: Vec::new() };
     let mut items = Vec::new();
-    while parser.at < tokens.len() {
+    while parser.at < tokens.len() && parser.definitions <= MOST_DEFINITIONS {
         match parser.item() {
             Ok(item) => items.push(item),
             Err(diagnostic) => {
@@ -61,6 +89,8 @@ pub(super) struct Parser<'a> {
     /// Nesting depth of the current expression.
     pub(super) depth: usize,
     pub(super) user_functions: Vec<String>,
+    /// Number of definitions so far.
+    pub(super) definitions: usize,
     /// Errors that do not prevent the declaration from being understood.
     pub(super) errors: Vec<Diagnostic>,
 }
@@ -193,14 +223,26 @@ impl<'a> Parser<'a> {
         }
     }
 
+    /// Counts a definition. Checking compares each with all others.
+    fn count_definition(&mut self) -> Parsed<()> {
+        self.definitions += 1;
+        if self.definitions <= MOST_DEFINITIONS {
+            return Ok(());
+        }
+        let message = format!("a text may have {MOST_DEFINITIONS} declarations, functions and statements");
+        Err(Box::new(Diagnostic::new(&self.span(), message).help("split it into several texts")))
+    }
+
     fn item(&mut self) -> Parsed<Item> {
+        self.count_definition()?;
         let mut attributes = Attributes::default();
         while self.take("#") {
             self.attribute(&mut attributes)?;
         }
-        let Attributes { docs, audit_samples, audit_scope, properties, uncompensated } = attributes;
+        let Attributes { docs, audit_samples, audit_scope, properties, uncompensated, limits } = attributes;
         let uncompensated_prefix = if uncompensated { "#[uncompensated] " } else { "" };
-        let prefix = &format!("{}{uncompensated_prefix}", audit_scope.attribute());
+        let limits_prefix = limits.map_or_else(String::new, |limits| format!("{} ", limits.attribute()));
+        let prefix = &format!("{}{uncompensated_prefix}{limits_prefix}", audit_scope.attribute());
         let visibility_start = self.at;
         if self.take_word("pub") && self.take("(") {
             while !self.take(")") {
@@ -211,7 +253,7 @@ impl<'a> Parser<'a> {
             }
         }
         let visibility = tokens::text(&self.tokens[visibility_start..self.at]);
-        let claims = audit_samples.is_some() || uncompensated || !properties.is_empty();
+        let claims = audit_samples.is_some() || uncompensated || limits.is_some() || !properties.is_empty();
         if claims && (self.is_word("fn") || self.is_word("const")) {
             return self.fail("a declaration after its attributes (functions and constants have only documentation)");
         }
@@ -236,6 +278,7 @@ impl<'a> Parser<'a> {
                 audit_scope,
                 properties,
                 uncompensated,
+                limits,
                 kind,
                 name,
                 inputs: Vec::new(),
@@ -267,6 +310,7 @@ impl<'a> Parser<'a> {
             audit_scope,
             properties,
             uncompensated,
+            limits,
             kind,
             name,
             inputs,
@@ -410,6 +454,7 @@ impl<'a> Parser<'a> {
     }
 
     fn user_function(&mut self) -> Parsed<UserFunction> {
+        self.count_definition()?;
         let start = self.at - 1;
         let name = self.name("the name of the function")?;
         self.expect("(", "and the parameters of the function")?;
@@ -494,6 +539,7 @@ impl<'a> Parser<'a> {
     }
 
     fn statement(&mut self, rest: bool) -> Parsed<Let> {
+        self.count_definition()?;
         let has_let = self.take_word("let");
         if has_let && self.is_word("mut") && matches!(self.tokens.get(self.at + 1), Some(t) if t.text != "=") {
             let mutable = Diagnostic::new(&self.span(), "values never change, found `let mut`");

@@ -18,18 +18,31 @@ pub struct Specialisation {
 
 /// Replaces each specialisation by a declaration.
 pub(super) fn specialise(mut items: Vec<Item>, diagnostics: &mut Diagnostics) -> Vec<Item> {
-    // Specialisations may build on each other in any order. Those whose original is known go first.
-    loop {
-        let known: Vec<Declaration> = items
-            .iter()
-            .filter_map(|item| if let Item::Declaration(d) = item { Some(d.clone()) } else { None })
-            .collect();
-        let ready =
-            |item: &Item| matches!(item, Item::Specialisation(s) if known.iter().any(|d| d.name.text == s.of.text));
-        let Some(place) = items.iter().position(ready) else { break };
-        let Item::Specialisation(specialisation) = items.remove(place) else { break };
-        if let Some(declaration) = specialised(&known, *specialisation, diagnostics) {
-            items.insert(place, Item::Declaration(declaration));
+    // Specialisations may build on each other in any order: each pass resolves those whose original is known.
+    let mut copied = 0;
+    let mut progress = true;
+    while progress {
+        progress = false;
+        let mut next = 0;
+        while let Some(item) = items.get(next) {
+            next += 1;
+            let Item::Specialisation(specialisation) = item else { continue };
+            let Some(original) = find(&items, &specialisation.of) else { continue };
+            copied += original.source.len();
+            if copied > MOST_COPIED {
+                let message =
+                    format!("the specialisations of this text repeat more than {MOST_COPIED} bytes of others");
+                let help = "declare what differs as a parameter";
+                diagnostics.push(Diagnostic::new(&specialisation.of.span, message).help(help));
+                items.retain(|item| !matches!(item, Item::Specialisation(_)));
+                return items;
+            }
+            progress = true;
+            next -= 1;
+            match specialised(original, specialisation, diagnostics) {
+                Some(declaration) => items[next] = Item::Declaration(declaration),
+                None => drop(items.remove(next)),
+            }
         }
     }
     for item in &items {
@@ -44,13 +57,20 @@ pub(super) fn specialise(mut items: Vec<Item>, diagnostics: &mut Diagnostics) ->
     items
 }
 
+/// Maximum size of the texts that specialisations copy, in bytes.
+const MOST_COPIED: usize = 1 << 20;
+
+fn find<'a>(items: &'a [Item], name: &Name) -> Option<&'a Declaration> {
+    let mut all = items.iter().filter_map(|item| if let Item::Declaration(d) = item { Some(d) } else { None });
+    all.find(|declaration| declaration.name.text == name.text)
+}
+
 fn specialised(
-    known: &[Declaration],
-    specialisation: Specialisation,
+    original: &Declaration,
+    specialisation: &Specialisation,
     diagnostics: &mut Diagnostics,
 ) -> Option<Declaration> {
-    let Specialisation { declaration, of, values } = specialisation;
-    let original = known.iter().find(|d| d.name.text == of.text)?;
+    let Specialisation { declaration, of, values } = specialisation.clone();
     if original.kind != declaration.kind {
         let (kind, found) = (declaration.kind.keyword(), original.kind.keyword());
         let message = format!(
@@ -89,5 +109,6 @@ fn specialised(
     // The original's text follows, so that this declaration comes first.
     let source = format!("{} {}", declaration.source, original.source);
     let uncompensated = declaration.uncompensated || original.uncompensated;
-    Some(Declaration { docs, inputs, body, uncompensated, formula: original.formula.clone(), source, ..declaration })
+    let (limits, formula) = (declaration.limits.or(original.limits), original.formula.clone());
+    Some(Declaration { docs, inputs, body, uncompensated, limits, formula, source, ..declaration })
 }

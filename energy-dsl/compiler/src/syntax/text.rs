@@ -74,7 +74,12 @@ impl Lexer<'_> {
         } else if self.rest().starts_with("//") {
             self.comment();
         } else if self.rest().starts_with("/*") {
-            self.at += self.rest().find("*/").map_or(self.rest().len(), |end| end + 2);
+            let end = self.rest().find("*/");
+            self.at += end.map_or(2, |end| end + 2);
+            if end.is_none() {
+                self.error(start, "this comment has no end", "close it with `*/`");
+                self.at = self.text.len();
+            }
         } else if c == '"' {
             self.string();
         } else if is_letter(c) || c == '_' {

@@ -155,15 +155,24 @@ fn flatten(stream: TokenStream, tokens: &mut Vec<Token>, (attribute, depth): (bo
     }
 }
 
+/// Longest number in characters. It holds all digits of any double.
+const LONGEST_NUMBER: usize = 1100;
+
 /// Returns the token of a number, or of a string with notation.
 pub(super) fn literal_kind(text: &str, span: &Span, attribute: bool) -> Kind {
-    if let Ok(string) = syn::parse_str::<syn::LitStr>(text) {
+    // Literals that begin with a digit are no strings. Parsing them takes the square of their length.
+    let is_number = text.starts_with(|c: char| c.is_ascii_digit());
+    if !is_number && let Ok(string) = syn::parse_str::<syn::LitStr>(text) {
         let content = string.value();
         return if attribute { Kind::Text(content) } else { Kind::Notation(notation::tokens(&content, span)) };
     }
     if text.starts_with('"') {
         // Only rustc passes on a string that is no token.
         return Diagnostic::known_to_rustc(span).into();
+    }
+    if text.len() > LONGEST_NUMBER {
+        let message = format!("a number of {} characters, and numbers may have {LONGEST_NUMBER}", text.len());
+        return Diagnostic::new(span, message).help("write it as 1.5e10").into();
     }
     let plain = text.replace('_', "");
     let plain = plain.trim_end_matches("f64").trim_end_matches("f32");

@@ -1,6 +1,7 @@
 use std::path::Path;
 
 use anyhow::Context;
+use energy_cli::Notice;
 use verify::audit::{Target, targets_in};
 
 /// Returns the elements with these names from the catalogue, or from a file if one is given. An empty list selects all.
@@ -9,7 +10,9 @@ pub fn targets(names: &[String], file: Option<&Path>) -> anyhow::Result<Vec<Targ
         let names: Vec<&str> = names.iter().map(String::as_str).collect();
         return targets_in(energy_catalogue::catalogue(), &names).map_err(anyhow::Error::msg);
     };
+    let notice = Notice::of(format!("compiling {} …", file.display()));
     let all = Target::of_file(file)?;
+    drop(notice);
     if let Some(unknown) = names.iter().find(|name| all.iter().all(|target| target.name() != *name)) {
         let known: Vec<&str> = all.iter().map(Target::name).collect();
         anyhow::bail!("{} does not declare {unknown}; it declares {}", file.display(), known.join(", "));

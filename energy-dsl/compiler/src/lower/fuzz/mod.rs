@@ -24,7 +24,7 @@ const TOLERANCE: f64 = 1e-7;
 fn program(source: &str) -> Option<Program> {
     let mut diagnostics = Diagnostics::default();
     let items = syntax::parse(source.parse().expect("tokens of Rust"), &mut diagnostics);
-    let program = check(&items, &mut diagnostics).remove(0);
+    let program = check(&items, &crate::budget::Budget::default(), &mut diagnostics).remove(0);
     diagnostics.0.is_empty().then_some(program)
 }
 
