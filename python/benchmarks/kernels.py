@@ -16,6 +16,7 @@ result.
 """
 
 import argparse
+import importlib
 import importlib.util
 import os
 import time
@@ -70,7 +71,7 @@ class Maths:
 
 
 def spring(m, c, x):
-    p, q = x
+    p, q = x[0], x[1]
     d = m.vector([q[i] - p[i] for i in range(3)])
     return c[0] / 2 * (m.sqrt(m.dot(d, d)) - c[1]) ** 2
 
@@ -223,10 +224,11 @@ def torch_run(kernel):
 
 def compiled_torch_run(kernel):
     import torch
+    from torch.fx.experimental.proxy_tensor import make_fx
 
-    torch._dynamo.reset()
     function, inputs = torch_derivatives(kernel)
-    function = torch.compile(function, fullgraph=True)
+    # Traced first: the compiler takes no derivatives within `vmap` itself.
+    function = torch.compile(make_fx(function)(*inputs))
     return lambda: [part.numpy() for part in function(*inputs)]
 
 
@@ -356,14 +358,14 @@ def agree(name, found, expected):
             raise SystemExit(f"{name}: results differ by {error:.1e} from those of this package")
 
 
-#: The package that each contender needs, and what makes its run.
+#: The packages that each contender needs, and what makes its run.
 CONTENDERS = {
-    "JAX": ("jax", jax_run),
-    "torch": ("torch", torch_run),
-    "torch, compiled": ("torch", compiled_torch_run),
-    "CasADi, map": ("casadi", casadi_run),
-    "SymPy, numba": ("sympy", sympy_run),
-    "SymForce, numba": ("symforce", symforce_run),
+    "JAX": (("jax",), jax_run),
+    "torch": (("torch",), torch_run),
+    "torch, compiled": (("torch",), compiled_torch_run),
+    "CasADi, map": (("casadi",), casadi_run),
+    "SymPy, numba": (("sympy", "numba"), sympy_run),
+    "SymForce, numba": (("symforce", "numba"), symforce_run),
 }
 
 
@@ -376,9 +378,11 @@ def measure(kernel, rounds, contenders):
     reference = [np.array(part) for part in runs["energy_dsl, library"]()]
     agree("text", runs["energy_dsl, text"](), reference)
     for name in contenders:
-        package, make = CONTENDERS[name]
-        if not importlib.util.find_spec(package):
+        packages, make = CONTENDERS[name]
+        if not all(importlib.util.find_spec(package) for package in packages):
             continue
+        for package in packages:
+            importlib.import_module(package)
         start = time.perf_counter()
         try:
             runs[name] = make(kernel)
