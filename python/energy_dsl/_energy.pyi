@@ -10,7 +10,7 @@ from typing_extensions import Self, disjoint_base
 __all__ = [
     "Element", "Elements", "EnergyError", "FolderInUseError", "Input", "ResourceError", "Simulation", "Snapshot",
     "System", "audit", "catalogue", "energies", "input_files", "library_element", "read_scene", "resume", "run",
-    "show", "version",
+    "scene_tables", "show", "version",
 ]
 
 #: float64, or float32 where elements are evaluated in single precision.
