@@ -268,7 +268,8 @@ class OwnForce:
     every integrator, if the force changes little within a step.
 
     With `jacobians=True`, implicit integrators evaluate it at the end of a step, several times. It then returns f,
-    ∂f/∂x and ∂f/∂v, both of shape (n, 3 points, 3 points), for order 2. `newton` refuses such a force: it has no energy.
+    ∂f/∂x and ∂f/∂v, both of shape (n, 3 points, 3 points), for order 2. `newton` refuses such a force, because it has no
+    energy.
     """
 
     is_energy = False

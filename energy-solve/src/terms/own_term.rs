@@ -225,8 +225,8 @@ impl<L: OwnLaw> PlacedOwnTerm<L> {
     }
 }
 
-/// Whether −∂f/∂x, with ∂f/∂x row by row, has no negative eigenvalue, up to rounding. Larger matrices than lanes support
-/// are not tried.
+/// Whether −∂f/∂x, with ∂f/∂x row by row, has no negative eigenvalue, up to rounding. `false` for matrices with more
+/// rows than lanes support.
 fn is_convex(by_position: &[f64], size: usize) -> bool {
     if size > MOST {
         return false;
