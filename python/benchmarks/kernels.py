@@ -1,15 +1,22 @@
-"""Value, gradient and Hessian of five kernels (residual and Jacobian of K5) beside JAX, CasADi and SymForce.
+"""Value, gradient and Hessian of five kernels (residual and Jacobian of K5) beside JAX, torch, CasADi, SymPy, SymForce.
 
-    pip install jax casadi symforce numba
+    pip install jax torch casadi sympy symforce numba
     python python/benchmarks/kernels.py
 
 All tools run in turns on one core, in double precision, on the same inputs, from NumPy arrays to arrays. Their results
-are compared first. JAX: `jit` of `vmap`, float64. CasADi: `Function.map`. SymForce: its generated Python, compiled by
-numba, in a compiled loop. Times are those of the fastest round, in nanoseconds per element. A tool that is not
-installed is left out.
+are compared first. A tool that is not installed is left out.
+
+- JAX: `jit` of `vmap`, float64. torch: `torch.func`, `vmap`, and the same compiled by `torch.compile`.
+- CasADi: `Function.map`.
+- SymPy: derivatives with common subexpressions eliminated, printed as Python, compiled by numba in a loop.
+- SymForce: its generated Python, compiled by numba in a loop.
+
+The first table has nanoseconds per element, of the fastest round; the second one seconds from the formula to the first
+result.
 """
 
 import argparse
+import importlib
 import importlib.util
 import os
 import time
@@ -64,7 +71,7 @@ class Maths:
 
 
 def spring(m, c, x):
-    p, q = x
+    p, q = x[0], x[1]
     d = m.vector([q[i] - p[i] for i in range(3)])
     return c[0] / 2 * (m.sqrt(m.dot(d, d)) - c[1]) ** 2
 
@@ -195,6 +202,99 @@ def casadi_run(kernel):
     return lambda: function(xs, cs)
 
 
+def torch_derivatives(kernel):
+    """Returns the function of all derivatives, and its inputs."""
+    import torch
+
+    torch.set_num_threads(1)
+    maths = Maths(torch, torch.stack)
+    value = lambda x, c: kernel.formula(maths, c, x)
+
+    def all_derivatives(x, c):
+        gradient, found = torch.func.grad_and_value(value)(x, c)
+        return (found, gradient) if kernel.residual else (found, gradient, torch.func.hessian(value)(x, c))
+
+    return torch.func.vmap(all_derivatives), [torch.from_numpy(array) for array in (kernel.x, kernel.constants)]
+
+
+def torch_run(kernel):
+    function, inputs = torch_derivatives(kernel)
+    return lambda: [part.numpy() for part in function(*inputs)]
+
+
+def compiled_torch_run(kernel):
+    import torch
+    from torch.fx.experimental.proxy_tensor import make_fx
+
+    function, inputs = torch_derivatives(kernel)
+    # Traced first: the compiler takes no derivatives within `vmap` itself.
+    function = torch.compile(make_fx(function)(*inputs))
+    return lambda: [part.numpy() for part in function(*inputs)]
+
+
+def sympy_results(kernel):
+    """Returns the symbols of unknowns and constants, and the formula of each entry of the results."""
+    import sympy
+
+    n = kernel.flat.shape[1]
+    x, c = sympy.symbols(f"x:{n}", real=True), sympy.symbols(f"c:{kernel.constants.shape[1]}", real=True)
+    value = kernel.formula(Maths(sympy, list), list(c), [list(x[3 * i : 3 * i + 3]) for i in range(n // 3)])
+    gradient = [sympy.diff(value, unknown) for unknown in x]
+    results = {"U[e]": value} | {f"g[e, {i}]": entry for i, entry in enumerate(gradient)}
+    for i in range(0 if kernel.residual else n):
+        results |= {f"H[e, {i}, {j}]": sympy.diff(gradient[i], x[j]) for j in range(i, n)}
+    return x, c, results
+
+
+def sympy_printer():
+    """Returns a function that prints Python. Small integer and half-integer powers become products and roots, because
+    numba's powers are slow."""
+    from sympy.printing.pycode import PythonCodePrinter
+
+    class Powers(PythonCodePrinter):
+        def _print_Pow(self, expr, **_):
+            base, exponent = f"({self._print(expr.base)})", expr.exp
+            if not (exponent.is_Rational and exponent.q in (1, 2) and abs(exponent) <= 4):
+                return super()._print_Pow(expr)
+            factors = [base] * (abs(exponent.p) // exponent.q) + [f"math.sqrt{base}"] * (exponent.q - 1)
+            product = f"({'*'.join(factors)})"
+            return product if exponent > 0 else f"(1.0/{product})"
+
+    return Powers().doprint
+
+
+def sympy_loop(kernel):
+    """Returns the text of a function that loops over all elements."""
+    import sympy
+
+    x, c, results = sympy_results(kernel)
+    shared, outputs = sympy.cse(list(results.values()), symbols=sympy.numbered_symbols("t"), order="none")
+    written = sympy_printer()
+    lines = [f"{name} = xs[e, {i}]" for i, name in enumerate(x)] + [f"{name} = cs[e, {i}]" for i, name in enumerate(c)]
+    lines += [f"{name} = {written(formula)}" for name, formula in shared]
+    lines += [f"{name} = {written(formula)}" for name, formula in zip(results, outputs)]
+    lines += [f"H[e, {i}, {j}] = H[e, {j}, {i}]" for i in range(0 if kernel.residual else len(x)) for j in range(i)]
+    body = "".join(f"        {line}\n" for line in lines)
+    return f"def loop(cs, xs, U, g, H):\n    for e in range(len(xs)):\n{body}"
+
+
+def sympy_run(kernel):
+    import math
+
+    import numba
+
+    scope = {"math": math}
+    exec(sympy_loop(kernel), scope)
+    loop, n = numba.njit(scope["loop"]), kernel.flat.shape[1]
+    U, g, H = np.empty(COUNT), np.empty((COUNT, n)), np.empty((COUNT, n, n) if not kernel.residual else (0, 0, 0))
+
+    def run():
+        loop(kernel.constants, kernel.flat, U, g, H)
+        return (U, g) if kernel.residual else (U, g, H)
+
+    return run
+
+
 def symforce_run(kernel):
     import logging
 
@@ -241,57 +341,86 @@ def symforce_run(kernel):
     return run
 
 
-def result_numbers(result):
-    return [np.asarray(part).reshape(COUNT, -1) for part in result]
+def result_numbers(name, result):
+    """Returns the results as one row of numbers for each element. Those of CasADi lie side by side."""
+    if name.startswith("CasADi"):
+        parts = [np.asarray(part) for part in result]
+        parts = [part.reshape(len(part), COUNT, -1).transpose(1, 0, 2) for part in parts]
+    else:
+        parts = [np.asarray(part) for part in result]
+    return [part.reshape(COUNT, -1) for part in parts]
 
 
 def agree(name, found, expected):
-    for a, b in zip(result_numbers(found), result_numbers(expected)):
+    for a, b in zip(result_numbers(name, found), result_numbers("energy_dsl", expected)):
         error = np.abs(a - b).max() / np.abs(b).max()
         if not error < 1e-9:
             raise SystemExit(f"{name}: results differ by {error:.1e} from those of this package")
 
 
-def measure(kernel, rounds):
+#: The packages that each contender needs, and what makes its run.
+CONTENDERS = {
+    "JAX": (("jax",), jax_run),
+    "torch": (("torch",), torch_run),
+    "torch, compiled": (("torch",), compiled_torch_run),
+    "CasADi, map": (("casadi",), casadi_run),
+    "SymPy, numba": (("sympy", "numba"), sympy_run),
+    "SymForce, numba": (("symforce", "numba"), symforce_run),
+}
+
+
+def measure(kernel, rounds, contenders):
+    """Returns nanoseconds per element, and seconds to the first result, by contender."""
+    start = time.perf_counter()
+    ed.energy(kernel.element.source)
+    seconds = {"energy_dsl, text": time.perf_counter() - start}
     runs = package_runs(kernel)
     reference = [np.array(part) for part in runs["energy_dsl, library"]()]
-    if importlib.util.find_spec("jax"):
+    agree("text", runs["energy_dsl, text"](), reference)
+    for name in contenders:
+        packages, make = CONTENDERS[name]
+        if not all(importlib.util.find_spec(package) for package in packages):
+            continue
+        for package in packages:
+            importlib.import_module(package)
         start = time.perf_counter()
-        runs["JAX"] = jax_run(kernel)
-        result = runs["JAX"]()
-        print(f"# {kernel.title}: JAX compiled in {time.perf_counter() - start:.2f} s", flush=True)
-        agree("JAX", result, reference)
-    if importlib.util.find_spec("casadi"):
-        runs["CasADi, map"] = casadi_run(kernel)
-        found = [np.asarray(part) for part in runs["CasADi, map"]()]
-        n = kernel.flat.shape[1]
-        rows = [part.reshape(-1, COUNT, n if i == 2 else 1).transpose(1, 0, 2) for i, part in enumerate(found)]
-        agree("CasADi", rows, reference)
-    if importlib.util.find_spec("symforce") and importlib.util.find_spec("numba"):
-        runs["SymForce, numba"] = symforce_run(kernel)
-        agree("SymForce", runs["SymForce, numba"](), reference)
-    for name, run in runs.items():
-        if name.endswith("text"):
-            agree(name, run(), reference)
+        try:
+            runs[name] = make(kernel)
+            result = runs[name]()
+        except Exception as error:
+            print(f"# {kernel.title}: {name} failed: {type(error).__name__}: {str(error)[:200]}", flush=True)
+            runs.pop(name, None)
+            continue
+        seconds[name] = time.perf_counter() - start
+        print(f"# {kernel.title}: {name} took {seconds[name]:.2f} s to its first result", flush=True)
+        agree(name, result, reference)
     times = {name: [] for name in runs}
     for _ in range(rounds):
         for name, run in runs.items():
             start = time.perf_counter()
             run()
             times[name].append(1e9 * (time.perf_counter() - start) / COUNT)
-    return {name: min(list_) for name, list_ in times.items()}
+    return {name: min(list_) for name, list_ in times.items()}, seconds
+
+
+def table(heading, titles, columns, form):
+    names = list(dict.fromkeys(name for column in columns for name in column))
+    print(f"\n| {heading} | {' | '.join(titles)} |\n|---|{'---:|' * len(titles)}")
+    for name in names:
+        cells = [format(column[name], form) if name in column else "–" for column in columns]
+        print(f"| {name} | {' | '.join(cells)} |")
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--rounds", type=int, default=21)
+    parser.add_argument("--contenders", nargs="*", default=list(CONTENDERS), choices=list(CONTENDERS))
     options = parser.parse_args()
-    found = [(kernel.title, measure(kernel, options.rounds)) for kernel in kernels()]
-    names = list(dict.fromkeys(name for _, times in found for name in times))
-    print(f"| ns per element | {' | '.join(title for title, _ in found)} |\n|---|{'---:|' * len(found)}")
-    for name in names:
-        cells = [f"{times[name]:,.0f}" if name in times else "–" for _, times in found]
-        print(f"| {name} | {' | '.join(cells)} |")
+    all_kernels = kernels()
+    found = [measure(kernel, options.rounds, options.contenders) for kernel in all_kernels]
+    titles = [kernel.title for kernel in all_kernels]
+    table("ns per element", titles, [times for times, _ in found], ",.0f")
+    table("seconds to the first result", titles, [seconds for _, seconds in found], ".3g")
 
 
 if __name__ == "__main__":

@@ -74,9 +74,9 @@ def load(path: str | _os.PathLike[str]) -> list[Element]:
 def element(name: str) -> Element:
     """Returns an element of the library, such as "HingeAngle". `catalogue()` lists their names.
 
-    Up to 800 operations, its values, gradients, Hessians, forces, residuals and Jacobians are compiled code, with the
-    bits of the same text in `energy`. Larger elements and products with Hessians run as tapes. `bind(...).is_compiled`
-    tells.
+    Up to 475 operations (100 in float32), its values, gradients, Hessians, forces, residuals and Jacobians are compiled
+    code, with the bits of the same text in `energy`. Larger elements and products with Hessians run as tapes.
+    `bind(...).is_compiled` tells.
     """
     found = _library_element(name)
     if found is None:
@@ -268,7 +268,8 @@ class OwnForce:
     every integrator, if the force changes little within a step.
 
     With `jacobians=True`, implicit integrators evaluate it at the end of a step, several times. It then returns f,
-    ∂f/∂x and ∂f/∂v, both of shape (n, 3 points, 3 points), for order 2. `newton` refuses such a force: it has no energy.
+    ∂f/∂x and ∂f/∂v, both of shape (n, 3 points, 3 points), for order 2. `newton` refuses such a force, because it has no
+    energy.
     """
 
     is_energy = False
@@ -303,6 +304,7 @@ class Simulation(_Simulation):
     - `move_pins(vertices, targets)` sets where pinned vertices are at the end of the next step;
     - `move_obstacle(name, translation, rotation)` moves the obstacles that `obstacles` names;
     - `wind` can be assigned with `wind=True`, if the scene has a wind;
+    - `change(parameters)` gives the scene other densities, stiffnesses and so on;
     - `forces` are own forces and energies by name: (element, stencils, inputs) of a text, whose inputs `set(name, …)`
       changes, or functions: OwnEnergy, OwnForce;
     - `snapshot()` and `restore(snapshot)` go back with the same bits; `reset()` goes back to the start, without
@@ -341,11 +343,36 @@ class Simulation(_Simulation):
                 raise TypeError(f"forces, {name}: expected {expected}, got {type(force).__name__}")
         self = super().__new__(cls, text, path, threads, obstacles, wind, texts, functions)
         self._recipe = (text, _os.path.abspath(path), threads, obstacles, wind, forces)
-        self._start = None
+        self._start, self._changes = None, {}
         return self
 
     _recipe: tuple[_Any, ...]
     _start: Snapshot | None
+    _changes: dict[str, _Any]
+
+    def change(self, parameters: _Mapping[str, _Any]) -> None:
+        """Goes on with other parameters of the scene, such as {"fabric.density": 0.3}; keys are paths into the scene.
+
+        The state and all controls stay. `reset` and `restore` keep the parameters of the last change. The scene is
+        assembled again, which takes as long as building it.
+
+        Raises ValueError for a wrong path, and for a scene with other time steps, vertices, triangles or terms; nothing
+        changes then.
+        """
+        import json
+
+        from ._energy import scene_tables
+        from .plain import plain
+        from .scene_paths import set_value
+
+        text, path = self._recipe[:2]
+        changes, tables = {**self._changes, **parameters}, scene_tables(text, path)
+        for key, value in changes.items():
+            set_value(tables, key, value)
+        if self._start is None:
+            self._start = self.snapshot()
+        self.change_scene(json.dumps(tables, default=plain), path)
+        self._changes = changes
 
     def step(self, steps: int = 1) -> int:
         """Takes steps, at most to the end of the scene. Returns the number taken."""
@@ -373,15 +400,22 @@ class Simulation(_Simulation):
         return dict(columns)
 
     def __reduce__(self) -> tuple[_Any, ...]:
-        own = {name: value for name, value in self.__dict__.items() if name not in ("_recipe", "_start")}
-        return _simulation, (type(self), self._recipe, self.snapshot(), self._start, own)
+        own = {name: value for name, value in self.__dict__.items() if name not in ("_recipe", "_start", "_changes")}
+        return _simulation, (type(self), self._recipe, self._changes, self.snapshot(), self._start, own)
 
 
 def _simulation(
-    cls: type[Simulation], recipe: tuple[_Any, ...], now: Snapshot, start: Snapshot | None, more: dict[str, _Any]
+    cls: type[Simulation],
+    recipe: tuple[_Any, ...],
+    changes: dict[str, _Any],
+    now: Snapshot,
+    start: Snapshot | None,
+    more: dict[str, _Any],
 ) -> Simulation:
     """Makes a simulation from a pickle."""
     simulation = cls._made(*recipe)
+    if changes:
+        simulation.change(changes)
     simulation.restore(now)
     simulation._start = start
     simulation.__dict__.update(more)

@@ -64,7 +64,7 @@ def damage(folder: Path, files: dict[str, list[Any]]) -> str:
 
 
 def replace(path: Path, text: str) -> None:
-    """Writes a file whole or not at all, and onto the disk.
+    """Writes a file whole or not at all, and onto the disk. Parts that killed processes have left are removed.
 
     Raises OSError, which names the file.
     """
@@ -75,6 +75,8 @@ def replace(path: Path, text: str) -> None:
             file.flush()
             os.fsync(file.fileno())
         part.replace(path)
+        for left in path.parent.glob(f"{path.name}.*.part"):
+            left.unlink(missing_ok=True)
     except OSError as error:
         part.unlink(missing_ok=True)
         raise OSError(error.errno, error.strerror, str(path)) from error

@@ -15,6 +15,7 @@ from typing import Any
 
 from . import _energy
 from .plain import plain
+from .scene_paths import set_value
 from .sweep_files import listed_inputs
 from .sweep_index import write_index, write_page, write_parquet
 from .sweep_pool import collect
@@ -113,7 +114,7 @@ def _job(base: dict[str, Any], place: str, choice: Choice, folder: Path, known: 
     """Describes a run to a worker. `known` holds hashes of files that were read already."""
     scene = copy.deepcopy(base)
     for key, value in choice.items():
-        _set(scene, key, value)
+        set_value(scene, key, value)
     text = json.dumps(scene, sort_keys=True, default=plain)
     path = str(Path(place) / "scene.toml")
     inputs = listed_inputs(text, path, known)
@@ -121,19 +122,3 @@ def _job(base: dict[str, Any], place: str, choice: Choice, folder: Path, known: 
     name = hashlib.sha256(identity.encode()).hexdigest()[:16]
     files = [[file, digest] for _, file, digest in inputs]
     return {"choice": choice, "text": text, "path": path, "folder": str(folder / name), "inputs": files}
-
-
-def _set(scene: dict[str, Any], path: str, value: Any) -> None:
-    """Sets the value at a path, such as "obstacles.0.friction". Numbers are places in lists."""
-    *tables, last = path.split(".")
-    table: Any = scene
-    for name in tables:
-        if isinstance(table, list):
-            if not (name.isdigit() and int(name) < len(table)):
-                raise ValueError(f"{path}: expected one of {len(table)} places, counted from 0, got `{name}`")
-            table = table[int(name)]
-        elif isinstance(table, dict):
-            table = table.setdefault(name, {})
-    if not isinstance(table, dict):
-        raise ValueError(f"{path}: `{'.'.join(tables)}` is not a table of the scene")
-    table[last] = value

@@ -69,7 +69,19 @@ def _tuple(results: Any) -> tuple[Any, ...]:
 
 
 class _Function(torch.autograd.Function):
-    """A method of a kernel. Its leading axes are free, so vmap adds one more."""
+    """The method of a kernel that a subclass names. Its leading axes are free, so vmap adds one more."""
+
+    method: str
+
+    def __init_subclass__(cls) -> None:
+        def forward(kernel: Kernel, *tensors: torch.Tensor) -> Any:
+            return _evaluated(getattr(kernel, cls.method), *tensors)
+
+        def vmap(info: Any, in_dims: Any, kernel: Kernel, *tensors: torch.Tensor) -> Any:
+            return cls._mapped(info, in_dims, kernel, *tensors)
+
+        for function in (forward, vmap):
+            setattr(cls, function.__name__, staticmethod(function))
 
     @staticmethod
     def setup_context(ctx: Any, inputs: Any, output: Any) -> None:
@@ -86,7 +98,7 @@ class _Function(torch.autograd.Function):
         return cls.apply(kernel, *tensors)
 
     @classmethod
-    def mapped(cls, info: Any, in_dims: Any, kernel: Kernel, *tensors: torch.Tensor) -> Any:
+    def _mapped(cls, info: Any, in_dims: Any, kernel: Kernel, *tensors: torch.Tensor) -> Any:
         """Evaluates with the mapped axis in front."""
         front = [
             tensor.expand(info.batch_size, *tensor.shape) if axis is None else tensor.movedim(axis, 0)
@@ -107,9 +119,7 @@ def _transposed(matrix: torch.Tensor, vector: torch.Tensor) -> torch.Tensor:
 class _Energy(_Function):
     """U(x)."""
 
-    @staticmethod
-    def forward(kernel: Kernel, x: torch.Tensor) -> Any:
-        return _evaluated(kernel.value, x)
+    method = "value"
 
     @staticmethod
     def backward(ctx: Any, weight: torch.Tensor) -> Any:
@@ -121,17 +131,11 @@ class _Energy(_Function):
         (x,) = ctx.saved_tensors
         return (_Gradient.of(ctx.kernel, x) * dx).sum((-2, -1))
 
-    @staticmethod
-    def vmap(info: Any, in_dims: Any, kernel: Kernel, x: torch.Tensor) -> Any:
-        return _Energy.mapped(info, in_dims, kernel, x)
-
 
 class _Gradient(_Function):
     """∂U/∂x. Its Jacobian is symmetric."""
 
-    @staticmethod
-    def forward(kernel: Kernel, x: torch.Tensor) -> Any:
-        return _evaluated(kernel.derivative, x)
+    method = "derivative"
 
     @staticmethod
     def backward(ctx: Any, weight: torch.Tensor) -> Any:
@@ -142,10 +146,6 @@ class _Gradient(_Function):
     def jvp(ctx: Any, _: None, dx: torch.Tensor) -> Any:
         (x,) = ctx.saved_tensors
         return _contracted(_Hessian.of(ctx.kernel, x), dx)
-
-    @staticmethod
-    def vmap(info: Any, in_dims: Any, kernel: Kernel, x: torch.Tensor) -> Any:
-        return _Gradient.mapped(info, in_dims, kernel, x)
 
 
 class _Final(_Function):
@@ -164,21 +164,13 @@ class _Final(_Function):
 class _Hessian(_Final):
     """∂²U/∂x²."""
 
-    @staticmethod
-    def forward(kernel: Kernel, x: torch.Tensor) -> Any:
-        return _evaluated(kernel.hessian, x)
-
-    @staticmethod
-    def vmap(info: Any, in_dims: Any, kernel: Kernel, x: torch.Tensor) -> Any:
-        return _Hessian.mapped(info, in_dims, kernel, x)
+    method = "hessian"
 
 
 class _Force(_Function):
     """f(x, v)."""
 
-    @staticmethod
-    def forward(kernel: Kernel, x: torch.Tensor, v: torch.Tensor) -> Any:
-        return _evaluated(kernel.force, x, v)
+    method = "force"
 
     @staticmethod
     def backward(ctx: Any, weight: torch.Tensor) -> Any:
@@ -191,29 +183,17 @@ class _Force(_Function):
         parts = [_contracted(matrix, d) for matrix, d in zip(jacobians, (dx, dv)) if d is not None]
         return sum(parts[1:], parts[0])
 
-    @staticmethod
-    def vmap(info: Any, in_dims: Any, kernel: Kernel, x: torch.Tensor, v: torch.Tensor) -> Any:
-        return _Force.mapped(info, in_dims, kernel, x, v)
-
 
 class _ForceJacobians(_Final):
     """∂f/∂x and ∂f/∂v."""
 
-    @staticmethod
-    def forward(kernel: Kernel, x: torch.Tensor, v: torch.Tensor) -> Any:
-        return _evaluated(kernel.force_jacobians, x, v)
-
-    @staticmethod
-    def vmap(info: Any, in_dims: Any, kernel: Kernel, x: torch.Tensor, v: torch.Tensor) -> Any:
-        return _ForceJacobians.mapped(info, in_dims, kernel, x, v)
+    method = "force_jacobians"
 
 
 class _Residual(_Function):
     """r(u)."""
 
-    @staticmethod
-    def forward(kernel: Kernel, u: torch.Tensor) -> Any:
-        return _evaluated(kernel.value, u)
+    method = "value"
 
     @staticmethod
     def backward(ctx: Any, weight: torch.Tensor) -> Any:
@@ -225,18 +205,8 @@ class _Residual(_Function):
         (u,) = ctx.saved_tensors
         return torch.einsum("...ri,...i->...r", _Jacobian.of(ctx.kernel, u), du)
 
-    @staticmethod
-    def vmap(info: Any, in_dims: Any, kernel: Kernel, u: torch.Tensor) -> Any:
-        return _Residual.mapped(info, in_dims, kernel, u)
-
 
 class _Jacobian(_Final):
     """∂r/∂u."""
 
-    @staticmethod
-    def forward(kernel: Kernel, u: torch.Tensor) -> Any:
-        return _evaluated(kernel.derivative, u)
-
-    @staticmethod
-    def vmap(info: Any, in_dims: Any, kernel: Kernel, u: torch.Tensor) -> Any:
-        return _Jacobian.mapped(info, in_dims, kernel, u)
+    method = "derivative"

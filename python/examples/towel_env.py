@@ -15,11 +15,10 @@ from numpy.typing import ArrayLike, NDArray
 
 import energy_dsl as ed
 
-gymnasium: Any
 try:
     import gymnasium
 except ImportError:
-    gymnasium = None
+    gymnasium: Any = None  # type: ignore[no-redef]
 
 Array = NDArray[np.floating[Any]]
 

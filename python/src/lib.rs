@@ -31,6 +31,7 @@ fn _energy(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(simulation::runs::resume, module)?)?;
     module.add_function(wrap_pyfunction!(simulation::runs::input_files, module)?)?;
     module.add_function(wrap_pyfunction!(simulation::runs::read_scene, module)?)?;
+    module.add_function(wrap_pyfunction!(simulation::runs::scene_tables, module)?)?;
     module.add_function(wrap_pyfunction!(simulation::runs::version, module)?)?;
     module.add_function(wrap_pyfunction!(tools::audit, module)?)?;
     module.add_function(wrap_pyfunction!(tools::show, module)?)

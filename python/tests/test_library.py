@@ -53,8 +53,8 @@ compiled_code = pytest.mark.skipif(not is_compiled("HookeSpring"), reason="built
 @compiled_code
 def test_all_but_the_largest_elements_are_compiled():
     tapes = [name for name in ed.catalogue() if not is_compiled(name)]
-    assert is_compiled("QuadraticHinge") and is_compiled("StVK") and is_compiled("PointToPlane"), tapes
-    assert "TetCorotational" in tapes and len(tapes) < 25, tapes
+    assert is_compiled("QuadraticHinge") and is_compiled("StVK") and is_compiled("HairBend"), tapes
+    assert "TetCorotational" in tapes and len(tapes) < 30, tapes
 
 
 @compiled_code

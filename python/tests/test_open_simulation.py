@@ -314,3 +314,54 @@ def test_threads_step_many_instances():
         list(pool.map(lambda simulation: simulation.step(10), instances))
     alone.step(10)
     assert all(np.array_equal(simulation.positions, alone.positions) for simulation in instances)
+
+
+STIFFNESS = "fabric.material.stvk.stretch_stiffness"
+
+
+def test_changed_parameters_act_as_those_of_a_scene_that_always_had_them():
+    own = (ed.energy(PULL), [[12]], {"t": [0.0, 0.0, 0.1], "k": 2.0})
+    changed = simulated(forces={"pull": own})
+    changed.change({STIFFNESS: np.float64(120.0), "fabric.density": 0.3})
+    stiff = {"density": 0.3, "material": {"stvk": {"stretch_stiffness": 120.0, "poisson_ratio": 0.3}}}
+    always = simulated({**SHEET, "fabric": stiff}, forces={"pull": own})
+    changed.step(5), always.step(5)
+    assert np.array_equal(changed.positions, always.positions)
+    changed.set("pull", k=5.0), always.set("pull", k=5.0)
+    changed.step(5), always.step(5)
+    assert np.array_equal(changed.positions, always.positions)
+
+
+def test_a_change_keeps_state_controls_reset_and_pickles():
+    simulation = simulated(BALL, obstacles=["ball"])
+    pins, start = simulation.pinned, simulation.positions
+    simulation.move_pins(pins, start[pins] + [0.0, 0.0, 0.01])
+    simulation.move_obstacle("ball", [0.0, 0.0, 0.02])
+    simulation.step(3)
+    x, v = simulation.positions, simulation.velocities
+    for stiffness in (80.0, 100.0):
+        simulation.change({STIFFNESS: stiffness})
+        assert np.array_equal(simulation.positions, x) and np.array_equal(simulation.velocities, v)
+    other = pickle.loads(pickle.dumps(simulation))
+    simulation.step(3), other.step(3)
+    assert np.array_equal(simulation.positions, other.positions)
+    np.testing.assert_allclose(simulation.positions[pins], start[pins] + [0.0, 0.0, 0.01], atol=1e-12)
+    for one in (simulation, other):
+        one.reset()
+        assert np.array_equal(one.positions, start) and one.steps_done == 0
+        one.change({"fabric.density": 0.4})
+        one.step(2)
+    assert np.array_equal(simulation.positions, other.positions)
+
+
+def test_a_change_that_does_not_fit_is_refused_and_changes_nothing():
+    simulation, untouched = simulated(), simulated()
+    simulation.step(2), untouched.step(2)
+    with pytest.raises(ValueError, match="another number of vertices"):
+        simulation.change({"mesh.sheet.cells": [5, 5]})
+    with pytest.raises(ValueError, match="another time step"):
+        simulation.change({"dt": 0.02})
+    with pytest.raises(ValueError, match="stretch_stifness"):
+        simulation.change({"fabric.material.stvk.stretch_stifness": 1.0})
+    simulation.step(2), untouched.step(2)
+    assert np.array_equal(simulation.positions, untouched.positions)

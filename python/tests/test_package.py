@@ -36,7 +36,10 @@ def test_metadata_name_licences_links_and_versions():
 
 
 def test_links_of_the_readme_work_elsewhere():
-    text = (PROJECT / "README.md").read_text(encoding="utf-8")
+    readme = PROJECT / "README.md"
+    if not readme.exists():
+        pytest.skip("not in the repository")
+    text = readme.read_text(encoding="utf-8")
     targets = re.findall(r"\]\(([^)]+)\)", text) + re.findall(r"^\[[^]]+\]: (\S+)", text, re.M)
     assert targets and all(target.startswith("https://") for target in targets), targets
     for target in targets:

@@ -165,7 +165,7 @@ def test_a_second_thread_in_one_simulation_is_told_so():
         "pins": [{"nearest": [-0.5, 0.5, 0.0]}],
     }
     simulation, alone = ed.Simulation(scene, threads=1), ed.Simulation(scene, threads=1)
-    running = threading.Thread(target=lambda: simulation.step(30))
+    running = threading.Thread(target=lambda: simulation.step(100))
     running.start()
     raised = []
     while running.is_alive():
@@ -175,7 +175,7 @@ def test_a_second_thread_in_one_simulation_is_told_so():
             raised.append(str(error))
     running.join()
     assert raised and "this Simulation is in use by another thread" in raised[0]
-    alone.step(30)
+    alone.step(100)
     assert np.array_equal(simulation.positions, alone.positions)
 
 

@@ -115,6 +115,18 @@ def test_each_file_of_a_run_can_be_truncated(whole, tmp_path):
         shutil.rmtree(copy)
 
 
+def test_parts_of_files_that_a_killed_worker_was_writing_are_removed(whole, tmp_path):
+    scene, grid, folder, sweep = whole
+    copy = tmp_path / "copy"
+    shutil.copytree(folder, copy)
+    run = copy / sweep.runs[0]["folder"]
+    (run / "sweep.json").rename(run / "sweep.json.123.part")
+    (copy / "index.csv.123.part").write_text("torn")
+    again = swept(scene, grid, copy, checkpoint=2)
+    assert again.runs == sweep.runs and files(copy) == files(folder)
+    assert list(copy.rglob("*.part")) == []
+
+
 def test_a_changed_file_of_the_same_size_is_noticed_and_a_copied_folder_is_not_run_again(whole, tmp_path):
     scene, grid, folder, sweep = whole
     shutil.copytree(folder, tmp_path / "copy", copy_function=shutil.copyfile)

@@ -44,8 +44,8 @@ pub trait CompiledBatch<S>: Send + Sync {
 /// as [`energy_dsl::Stored`] lists them.
 ///
 /// The result is `None` without the feature `batches`, for an unknown name, and for elements whose largest routine has
-/// more than 800 operations. These take too long to compile. It is also `None` if coordinates cannot be indexed by
-/// `u32`.
+/// more than 475 operations (100 in `f32`). These take too long to compile, and too much space. It is also `None` if
+/// coordinates cannot be indexed by `u32`.
 ///
 /// ```
 /// # #[cfg(feature = "batches")] {

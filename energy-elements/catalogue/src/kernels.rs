@@ -3,21 +3,22 @@
 use std::ops::Range;
 
 use energy_dsl::{
-    BatchError, Declaration, Element, Flagged, Float, Packed, PackedForce, PackedPotential, PackedResidual, Stored,
+    BatchError, Declaration, Element, Flagged, Float, Packed, PackedForce, PackedPotential, PackedResidual, Routine,
+    Stored,
 };
 use energy_elements::for_each_element;
 
 use crate::batches::{BatchRoutine, Bind, CompiledBatch, Scalar};
 use crate::matrices::{hessian_matrices, jacobian_matrices};
 
-/// Operations of the largest routine that is compiled. LLVM needs minutes and gigabytes for larger ones at all levels;
-/// tapes take about twice the time of compiled code there.
-const LARGEST: usize = 800;
-
-const fn is_small(declaration: &Declaration) -> bool {
+/// Whether no routine of an element has more operations than the largest that is compiled.
+const fn is_small(declaration: &Declaration, largest: usize) -> bool {
     let mut routine = 0;
     while routine < declaration.routines.len() {
-        if declaration.routines[routine].reduced.total() > LARGEST {
+        let Routine { name, reduced, .. } = declaration.routines[routine];
+        // Products of Hessians and vectors are not compiled.
+        let is_compiled = !matches!(name.as_bytes(), b"hessian_vector");
+        if is_compiled && reduced.total() > largest {
             return false;
         }
         routine += 1;
@@ -25,11 +26,12 @@ const fn is_small(declaration: &Declaration) -> bool {
     true
 }
 
-// A function that is not inlined. With a constant of the trait, each crate that uses it would compile all kernels.
+// `LARGEST` is in scope where the table is made: in a function that is not inlined. With a constant of the trait, each
+// crate that uses it would compile all kernels.
 macro_rules! table {
     ($($kind:ident $name:ident),*) => {
         &[$({
-            const IS_SMALL: bool = is_small(<energy_elements::$name<f64> as Element>::DECLARATION);
+            const IS_SMALL: bool = is_small(<energy_elements::$name<f64> as Element>::DECLARATION, LARGEST);
             (stringify!($name), if IS_SMALL { Some($kind::<energy_elements::$name<_>, _> as Bind<_>) } else { None })
         }),*]
     };
@@ -38,6 +40,8 @@ macro_rules! table {
 impl Scalar for f64 {
     #[inline(never)]
     fn table() -> &'static [(&'static str, Option<Bind<Self>>)] {
+        // Larger routines would double the size of the Python package; tapes take up to twice the time there.
+        const LARGEST: usize = 475;
         const TABLE: &[(&str, Option<Bind<f64>>)] = for_each_element!(with kinds table);
         TABLE
     }
@@ -46,6 +50,8 @@ impl Scalar for f64 {
 impl Scalar for f32 {
     #[inline(never)]
     fn table() -> &'static [(&'static str, Option<Bind<Self>>)] {
+        // Single precision is asked for less often.
+        const LARGEST: usize = 100;
         const TABLE: &[(&str, Option<Bind<f32>>)] = for_each_element!(with kinds table);
         TABLE
     }

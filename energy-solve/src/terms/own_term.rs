@@ -9,7 +9,7 @@ use crate::matrix::dof_map::DofMap;
 use crate::matrix::pattern::Pattern;
 use crate::matrix::vector::block_times;
 use crate::terms::counts::Tally;
-use crate::terms::curvature::{Curvature, change_dense};
+use crate::terms::curvature::{Curvature, MOST, change_dense, is_semi_definite};
 use crate::terms::linearisation::Linearisation;
 use crate::terms::state::{State, StepStart};
 use crate::terms::stencils::Stencils;
@@ -143,7 +143,9 @@ impl<L: OwnLaw> PlacedOwnTerm<L> {
     }
 
     fn gathered(&self, all: &[Vector3<f64>]) -> Vec<f64> {
-        self.term.vertices.iter().flat_map(|&vertex| all[vertex as usize]).collect()
+        let mut numbers = Vec::with_capacity(3 * self.term.vertices.len());
+        self.term.vertices.iter().for_each(|&vertex| numbers.extend_from_slice(&all[vertex as usize]));
+        numbers
     }
 
     fn evaluated(&self, order: Order, state: State<'_>) -> OwnResults {
@@ -200,6 +202,9 @@ impl<L: OwnLaw> PlacedOwnTerm<L> {
         let mut projected = 0;
         let mut triangle = vec![[[0.0; 3]; 3]; n * (n + 1) / 2];
         for matrix in by_position.chunks_exact_mut(9 * n * n) {
+            if is_convex(matrix, 3 * n) {
+                continue;
+            }
             for (i, j) in (0..n).flat_map(|i| (i..n).map(move |j| (i, j))) {
                 triangle[triangle_index(n, i, j)] = block(matrix, n, i, j).map(|row| row.map(|entry| -entry));
             }
@@ -218,6 +223,20 @@ impl<L: OwnLaw> PlacedOwnTerm<L> {
         }
         projected
     }
+}
+
+/// Whether −∂f/∂x, with ∂f/∂x row by row, has no negative eigenvalue, up to rounding. `false` for matrices with more
+/// rows than lanes support.
+fn is_convex(by_position: &[f64], size: usize) -> bool {
+    if size > MOST {
+        return false;
+    }
+    let mut upper = [0.0; MOST * (MOST + 1) / 2];
+    let entries = (0..size).flat_map(|i| (i..size).map(move |j| (i, j)));
+    for (to, (i, j)) in upper.iter_mut().zip(entries) {
+        *to = -by_position[i * size + j];
+    }
+    is_semi_definite(&upper[..size * (size + 1) / 2], size)
 }
 
 /// Returns block (i, j) of an element's matrix of 3 n × 3 n numbers.

@@ -3,7 +3,7 @@
 mod own;
 pub mod runs;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use cloth_core::geometry::Pose;
@@ -108,9 +108,7 @@ impl Simulation {
         texts: Vec<(String, Py<Element>, Bound<'_, PyAny>, Bound<'_, PyDict>)>,
         functions: Vec<(String, Py<PyAny>, Bound<'_, PyAny>, bool, bool)>,
     ) -> PyResult<Self> {
-        let text = runs::toml_text(text)?;
-        let located = |error: String| wrong(runs::with_line(&text, &error));
-        let scene = Scene::parse(&text, &path).map_err(|error| located(error.to_string()))?;
+        let scene = parsed(text, &path)?;
         let is_closed = obstacles.is_empty() && !wind && texts.is_empty() && functions.is_empty();
         let simulation = if is_closed {
             py.detach(|| cloth_core::Simulation::new(&scene)).map_err(wrong)?
@@ -374,6 +372,14 @@ impl Simulation {
         Ok(Some(columns))
     }
 
+    /// Goes on with other parameters of the scene, given as its whole text.
+    fn change_scene(&self, py: Python<'_>, text: &str, path: PathBuf) -> PyResult<()> {
+        let mut guard = self.inner.get()?;
+        let scene = parsed(text, &path)?;
+        let simulation = &mut *guard;
+        py.detach(|| simulation.change_scene(&scene)).map_err(|error| self.refusal(error))
+    }
+
     /// Returns everything that the further motion depends on, parameters of own texts included.
     fn snapshot(&self, py: Python<'_>) -> PyResult<Snapshot> {
         let inner = self.inner.get()?.snapshot();
@@ -404,6 +410,12 @@ impl Simulation {
     fn refusal(&self, error: SimulationError) -> PyErr {
         taken(&self.raised).unwrap_or_else(|| PyValueError::new_err(crate::errors::with_causes(&error)))
     }
+}
+
+/// Reads the text of a scene. A message quotes the line that it names.
+fn parsed(text: &str, path: &Path) -> PyResult<Scene> {
+    let text = runs::toml_text(text)?;
+    Scene::parse(&text, path).map_err(|error| wrong(runs::with_line(&text, &error.to_string())))
 }
 
 fn limited(simulation: cloth_core::Simulation, threads: Option<usize>) -> cloth_core::Simulation {

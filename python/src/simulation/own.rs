@@ -4,8 +4,8 @@ use std::fmt;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use cloth_core::simulation::OwnForce;
-use energy_compiler::{Elements as Tapes, Interpreted};
-use energy_dsl::{Declaration, Kind};
+use energy_compiler::Elements as Tapes;
+use energy_dsl::{Declaration, Element as _, Kind, energy};
 use energy_solve::{Character, Order, OwnLaw, OwnResults, OwnTerm, SteeredTapeTerm, SteeredTapes, Term};
 use numpy::{PyArray1, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::exceptions::{PyTypeError, PyValueError};
@@ -106,6 +106,11 @@ impl OwnForce for OwnText {
         let elements = self.elements.lock().unwrap_or_else(PoisonError::into_inner).clone();
         let declaration = self.element.inner.declaration();
         let mut handles = self.handles.lock().unwrap_or_else(PoisonError::into_inner);
+        // Terms of an earlier assembly of the scene are gone.
+        handles.retain(|handle| match handle {
+            Handle::Energy(_, tapes) => tapes.is_shared(),
+            Handle::Whole(shared) => Arc::strong_count(shared) > 1,
+        });
         let name = self.name.clone();
         if !self.is_whole() {
             let tapes = SteeredTapes::new(elements.tape().selected(numbers));
@@ -120,6 +125,16 @@ impl OwnForce for OwnText {
             _ => Box::new(OwnTerm::new(name, TextResidual { elements: shared, points: self.points }, vertices)),
         }
     }
+}
+
+energy! {
+    // What reports say about the terms of functions.
+
+    /// An energy that a function of Python evaluates.
+    energy PythonEnergy(p: Point) { norm_squared(p) }
+
+    /// A force that a function of Python evaluates.
+    force PythonForce(p: Point) { p }
 }
 
 /// A force or an energy that a function of Python evaluates.
@@ -266,14 +281,7 @@ impl OwnForce for OwnFunction {
 
 impl OwnLaw for OwnFunction {
     fn declaration(&self) -> &'static Declaration {
-        // What reports say about the term.
-        let text = match self.is_energy {
-            true => {
-                "/// An energy that a function of Python evaluates.\nenergy PythonEnergy(p: Point) { norm_squared(p) }"
-            }
-            false => "/// A force that a function of Python evaluates.\nforce PythonForce(p: Point) { p }",
-        };
-        Interpreted::from_source(text).expect("a correct text").remove(0).declaration()
+        if self.is_energy { PythonEnergy::<f64>::DECLARATION } else { PythonForce::<f64>::DECLARATION }
     }
 
     fn points(&self) -> usize {

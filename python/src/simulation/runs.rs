@@ -169,8 +169,15 @@ pub fn input_files(text: &str, path: PathBuf) -> PyResult<Vec<PathBuf>> {
 
 /// Returns the tables of a scene file.
 #[pyfunction]
-pub fn read_scene<'py>(py: Python<'py>, path: PathBuf) -> PyResult<Bound<'py, PyAny>> {
+pub fn read_scene(py: Python<'_>, path: PathBuf) -> PyResult<Bound<'_, PyAny>> {
     let text = Scene::text(&path).map_err(|error| wrong(with_causes(&error)))?;
+    scene_tables(py, &text, path)
+}
+
+/// Returns the tables of a scene's text.
+#[pyfunction]
+pub fn scene_tables<'py>(py: Python<'py>, text: &str, path: PathBuf) -> PyResult<Bound<'py, PyAny>> {
+    let text = toml_text(text)?;
     let table = text.parse::<toml::Table>().map_err(|error| wrong(format!("{}: {error}", path.display())))?;
     object(py, &toml::Value::Table(table))
 }

@@ -1,5 +1,6 @@
 //! Steps a scene through time: cloth and hair, divided into islands that may sleep.
 
+mod change;
 mod collision;
 mod deformed;
 mod island;

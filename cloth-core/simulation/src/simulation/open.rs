@@ -1,6 +1,7 @@
 //! A simulation that a program controls: state, pins, wind, obstacles and own forces change between steps.
 
 use std::collections::BTreeMap;
+use std::fmt;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use energy_dsl::Vector3;
@@ -96,6 +97,9 @@ pub enum ControlError {
     /// A vertex would be inside an obstacle.
     #[error("vertex {vertex} would be inside {obstacle} at these positions")]
     Inside { vertex: usize, obstacle: String },
+    /// The state cannot be carried over to a changed scene.
+    #[error("the changed scene has {what}; only parameters may change during a simulation")]
+    OtherScene { what: &'static str },
 }
 
 /// Everything that the further motion of a controlled simulation depends on, except for the parameters of own forces.
@@ -144,13 +148,25 @@ impl SavedPoses {
 }
 
 /// What a program controls, in a running simulation.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Default)]
 pub(super) struct Controlled {
+    /// The controls that the simulation was created with.
+    pub(super) controls: Controls,
+    /// Checksums of the masses before changes of the scene.
+    pub(super) earlier_masses: Vec<u32>,
     /// Name and motion of each steered obstacle.
     obstacles: Vec<(String, Steering)>,
     wind: Option<SteeredVelocity>,
     /// Targets of pinned vertices, in m.
     targets: BTreeMap<usize, Vector3<f64>>,
+}
+
+impl fmt::Debug for Controlled {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { obstacles, wind, targets, .. } = self;
+        let mut fields = f.debug_struct("Controlled");
+        fields.field("obstacles", obstacles).field("wind", wind).field("targets", targets).finish_non_exhaustive()
+    }
 }
 
 impl Simulation {
@@ -182,7 +198,8 @@ impl Simulation {
     /// # Errors
     /// Returns an error if [`Simulation::new`] would, or if a control does not fit the scene.
     pub fn controlled(scene: &Scene, controls: &Controls) -> Result<Self, SimulationError> {
-        let (mut scene, mut controlled) = (scene.clone(), Controlled::default());
+        let mut scene = scene.clone();
+        let mut controlled = Controlled { controls: controls.clone(), ..Controlled::default() };
         let named = |(number, one): (usize, &crate::scene::ObstacleDescription)| one.name(number);
         let known: Vec<String> = scene.obstacles.iter().enumerate().map(named).collect();
         for name in &controls.obstacles {

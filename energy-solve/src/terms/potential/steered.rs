@@ -45,6 +45,12 @@ impl SteeredTapes {
         *shared = (shared.0 + 1, elements);
     }
 
+    /// Whether a term, or another copy of this, still shares the elements.
+    #[must_use]
+    pub fn is_shared(&self) -> bool {
+        Arc::strong_count(&self.shared) > 1
+    }
+
     /// Returns the number of replacements, and the elements.
     fn now(&self) -> (u64, TapeElements) {
         self.shared.lock().unwrap_or_else(PoisonError::into_inner).clone()
