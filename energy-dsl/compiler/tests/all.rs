@@ -6,5 +6,6 @@ mod language;
 mod range;
 mod rest_parts;
 mod run_time;
+mod short_hessians;
 mod singular_values;
 mod token_soup;

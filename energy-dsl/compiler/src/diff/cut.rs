@@ -9,7 +9,10 @@ use super::coordinates::Coordinates;
 use super::forward::{self, Sparse, combine, tangents};
 use super::local::Order;
 use super::{accumulate, differentiable, moving_operands};
-use crate::graph::{Graph, NodeId, Op};
+use crate::graph::{Graph, NodeId, Op, count, ordinary};
+
+/// The fewest nodes of a cut above which other cuts are looked for.
+const NESTED: usize = 3;
 
 /// Derivatives gathered at a cut.
 pub(super) struct Gathered {
@@ -29,8 +32,8 @@ pub(super) fn derivatives(
     coordinates: &Coordinates,
 ) -> Option<Gathered> {
     let n = coordinates.len();
-    let (slopes, curvatures, is_safe_above) = by_cut(g, output, cut);
-    let safe = is_safe_above && adjoint::is_safe(g, cut, Order::Second, true);
+    let Gathered { gradient: slopes, hessian: curvatures, safe } = by_cut(g, output, cut);
+    let safe = safe && adjoint::is_safe(g, cut, Order::Second, true);
     let weights: Weighted = cut.iter().copied().zip(slopes).collect();
     let gradient = adjoint::gradient(g, &weights, coordinates, Order::Second)?;
     let mut hessian = adjoint::second_derivatives(g, &weights, coordinates)?;
@@ -58,25 +61,70 @@ pub(super) fn derivatives(
     Some(Gathered { gradient, hessian, safe })
 }
 
-/// Returns the first and second derivatives of U with respect to the nodes of the cut, and whether they are right
-/// everywhere.
-fn by_cut(g: &mut Graph, output: NodeId, cut: &[NodeId]) -> (Vec<NodeId>, BTreeMap<usize, NodeId>, bool) {
+/// Returns the derivatives of U with respect to the nodes of the cut. They may be gathered at a cut above.
+fn by_cut(g: &mut Graph, output: NodeId, cut: &[NodeId]) -> Gathered {
     let coordinates = Coordinates::of_nodes(g, cut);
     let whole = adjoint::alone(g, output);
     let slopes = adjoint::gradient(g, &whole, &coordinates, Order::Second);
     let curvatures = adjoint::second_derivatives(g, &whole, &coordinates);
-    if let (Some(slopes), Some(curvatures)) = (slopes, curvatures) {
-        return (slopes, curvatures, adjoint::is_safe(g, &[output], Order::Second, true));
+    let mut best = match (slopes, curvatures) {
+        (Some(gradient), Some(hessian)) => {
+            Gathered { gradient, hessian, safe: adjoint::is_safe(g, &[output], Order::Second, true) }
+        }
+        _ => {
+            let gradient = forward::first_derivatives(g, &[output], &coordinates, Order::First).remove(0);
+            Gathered { gradient, hessian: forward::second_derivatives(g, output, &coordinates), safe: true }
+        }
+    };
+    if cut.len() < NESTED {
+        return best;
     }
-    let slopes = forward::first_derivatives(g, &[output], &coordinates, Order::First).remove(0);
-    (slopes, forward::second_derivatives(g, output, &coordinates), true)
+    for waist in waists(g, output, &coordinates) {
+        if let Some(found) = derivatives(g, output, &waist, &coordinates)
+            && found.cost(g) < best.cost(g)
+        {
+            best = found;
+        }
+    }
+    best
+}
+
+impl Gathered {
+    fn cost(&self, g: &mut Graph) -> usize {
+        let nodes: Vec<NodeId> = self.gradient.iter().chain(self.hessian.values()).copied().collect();
+        ordinary(g, &nodes).map_or_else(|| count(g, &nodes), |(nodes, _)| count(g, &nodes)).cost()
+    }
+}
+
+/// Returns the linear functions of the coordinates that U is computed from, if they are fewer than the coordinates.
+fn linear_front(g: &Graph, output: NodeId, coordinates: &Coordinates) -> Option<Vec<NodeId>> {
+    let mut linear: BTreeSet<NodeId> = BTreeSet::new();
+    let mut front: BTreeSet<NodeId> = BTreeSet::new();
+    for node in differentiable(g, &[output], Order::Second) {
+        let operands = moving_operands(g, node, Order::Second);
+        let moving = || operands.iter().filter(|&&operand| g.varies(operand));
+        let is_linear = match g.op(node) {
+            Op::Add(..) | Op::Sub(..) | Op::Neg(_) => true,
+            Op::Mul(a, b) => !(g.varies(a) && g.varies(b)),
+            Op::Div(_, divisor) => !g.varies(divisor),
+            _ => false,
+        };
+        if coordinates.seeds.contains_key(&node) || is_linear && moving().all(|operand| linear.contains(operand)) {
+            linear.insert(node);
+        } else {
+            front.extend(moving().filter(|operand| linear.contains(operand)));
+        }
+    }
+    let is_inner = front.iter().any(|node| !coordinates.seeds.contains_key(node));
+    (is_inner && front.len() > 1 && front.len() < coordinates.len()).then(|| front.into_iter().collect())
 }
 
 /// Returns the narrowest parts of the graph between the coordinates and U, of those that are closest to the coordinates:
-/// one node, and several.
+/// one node, several, and linear functions of the coordinates.
 ///
-/// U is replaced by what it is computed from, the last node first. What is left at any time is a cut.
+/// Each node of a front is replaced by its operands, the last node first, so that any front is a cut.
 pub(super) fn waists(g: &Graph, output: NodeId, coordinates: &Coordinates) -> Vec<Vec<NodeId>> {
+    let is_inner = |front: &BTreeSet<NodeId>| front.iter().any(|node| !coordinates.seeds.contains_key(node));
     let mut front = BTreeSet::from([output]);
     let (mut single, mut several): (Option<Vec<NodeId>>, Option<Vec<NodeId>>) = (None, None);
     while let Some(last) = front.iter().copied().rfind(|node| !coordinates.seeds.contains_key(node)) {
@@ -85,12 +133,14 @@ pub(super) fn waists(g: &Graph, output: NodeId, coordinates: &Coordinates) -> Ve
         let size = front.len();
         let narrowest = several.as_ref().map_or(coordinates.len(), |cut| cut.len() + 1);
         match size {
+            _ if !is_inner(&front) => {}
             1 => (single, several) = (Some(front.iter().copied().collect()), None),
             _ if size < narrowest => several = Some(front.iter().copied().collect()),
             _ => {}
         }
     }
-    single.into_iter().chain(several).collect()
+    let linear = linear_front(g, output, coordinates).filter(|cut| several.as_ref() != Some(cut));
+    single.into_iter().chain(several).chain(linear).collect()
 }
 
 /// Returns the robust primitives that depend on no other one, if every path from the coordinates to U leads through

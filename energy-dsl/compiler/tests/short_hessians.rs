@@ -1,0 +1,59 @@
+//! Hessians of formulas from elsewhere are gathered at their narrowest parts.
+
+use energy_compiler::Listing;
+
+/// A formula, and the most operations of its reduced Hessian.
+const FORMULAS: [(&str, usize); 6] = [
+    // With s = ‖d‖², ∇²U = 2 f′ I + 4 f″ d dᵀ: 6 for s, 8 for f, 12 for f′ and f″, 6 for each product, 9 for ∇U.
+    ("energy LennardJones(p, q: Point; k, s: Scalar) { let r = s^2 / norm_squared(p - q); 4 * k * (r^6 - r^3) }", 70),
+    // f of a length: its derivatives are scalars.
+    (
+        "energy Buckingham(p, q: Point; a, b, c: Scalar) {
+        let s = norm_squared(p - q); a * exp(-b * sqrt(s)) - c / s^3 + c / s^4
+      }",
+        95,
+    ),
+    // f of a determinant, with J = a·(b × c): ∇²J is linear in the edges.
+    (
+        "energy Volume(x0, x1, x2, x3: Point; k: Scalar) {
+        let J = det(columns(x1 - x0, x2 - x0, x3 - x0)); k * (log(J)^2 + (J - 1)^2 + 1 / J^2 + exp(-J))
+      }",
+        210,
+    ),
+    // Two components of the slip: 2 × 2 curvatures, and constant rates of twelve coordinates.
+    (
+        "energy LaggedFriction(x0, x1, x2, x3: Point; y: Vec3, u, v: Vec3, b, c: Scalar, λ, ε: Scalar) {
+        let d = x0 - (1 - b - c) * x1 - b * x2 - c * x3 - y;
+        let s = sqrt(dot(d, u)^2 + dot(d, v)^2);
+        λ * (if s < ε { s^2 / ε - s^3 / (3 * ε^2) + ε / 3 } else { s })
+      }",
+        500,
+    ),
+    // Gaps of two midpoints: six linear functions of twelve coordinates.
+    (
+        "energy Yarn(a0, a1, b0, b1: Point; k, r: Scalar) {
+        let d = (a0 + a1) / 2 - (b0 + b1) / 2; k * ((r^2 / norm_squared(d))^2 + norm_squared(d) / r^2 - 2)
+      }",
+        130,
+    ),
+    // One quotient instead of nine.
+    (
+        "energy Inverse(x0, x1, x2, x3: Point) {
+        let G = inverse(columns(x1 - x0, x2 - x0, x3 - x0)); ddot(G, G)
+      }",
+        1200,
+    ),
+];
+
+#[test]
+fn hessians_are_gathered_at_narrow_parts() {
+    for (source, most) in FORMULAS {
+        let listing = Listing::from_source(source).expect("a sound formula").remove(0);
+        let plans = listing.plans();
+        let row = plans.lines().find(|line| line.contains("taken")).expect("a route is taken");
+        let count = row.split_once(',').and_then(|(_, rest)| rest.split_whitespace().next()).expect("a count");
+        let count: usize = count.parse().expect("a number");
+        println!("{}: {count} operations", listing.name());
+        assert!(count <= most, "{}: {count} operations, more than {most}\n{plans}", listing.name());
+    }
+}
