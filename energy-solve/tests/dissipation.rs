@@ -44,6 +44,14 @@ impl DissipationLaw for Gusts {
     }
 }
 
+/// Returns the largest difference of forces, relative to the largest force.
+fn distance(a: &[Vector3<f64>], b: &[Vector3<f64>]) -> f64 {
+    let components = |forces: &[Vector3<f64>]| forces.iter().flatten().copied().collect::<Vec<f64>>();
+    let (a, b) = (components(a), components(b));
+    let largest = b.iter().fold(0.0_f64, |largest, x| largest.max(x.abs()));
+    a.iter().zip(&b).fold(0.0_f64, |most, (a, b)| most.max((a - b).abs())) / largest
+}
+
 #[test]
 fn acting_elements_are_summed_for_any_number_of_threads() {
     let triangles = triangles();
@@ -66,12 +74,14 @@ fn acting_elements_are_summed_for_any_number_of_threads() {
             system.begin_step(StepStart { time, dt: 0.01, state }).unwrap();
             let mut matrix = system.matrix();
             let linear = system.linearise(state, options, &mut matrix).unwrap().force;
-            assert!(linear == system.forces(state).unwrap());
+            // Routes to the gradient and to the Hessian may round differently.
+            let forces = system.forces(state).unwrap();
+            assert!(distance(&linear, &forces) <= 1e-15);
             assert_eq!(system.energies(&x).unwrap()[0].energy, None);
             let dissipation = system.dissipation(state).unwrap();
             let counts = system.terms().next().unwrap().1;
             assert_eq!(counts.hessian.evaluated + counts.hessian.skipped, triangles.len() as u64);
-            found.push((linear, dissipation, matrix.values().to_vec(), counts));
+            found.push((forces, dissipation, (linear, matrix.values().to_vec()), counts));
         }
         assert!(found[0] == found[1], "{time} s");
 

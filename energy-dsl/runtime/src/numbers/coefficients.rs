@@ -280,9 +280,16 @@ impl Extent {
     }
 }
 
+/// The coefficients of all series of a bundle.
+struct Store {
+    rows: Vec<Coefficients>,
+    /// Rows that belong to a series. Later ones wait to be used again.
+    used: usize,
+}
+
 thread_local! {
-    /// The coefficients of all series of the bundle that this thread is computing.
-    static COEFFICIENTS: RefCell<Vec<Coefficients>> = const { RefCell::new(Vec::new()) };
+    /// The coefficients of the bundle that this thread is computing.
+    static COEFFICIENTS: RefCell<Store> = const { RefCell::new(Store { rows: Vec::new(), used: 0 }) };
 }
 
 /// The first coefficients of a series: a handle. They do not change, and are forgotten after each bundle.
@@ -296,7 +303,7 @@ impl List {
     pub(super) const EMPTY: Self = Self { start: 0, count: 0 };
 
     pub(super) fn forget_all() {
-        COEFFICIENTS.with_borrow_mut(Vec::clear);
+        COEFFICIENTS.with_borrow_mut(|all| all.used = 0);
     }
 
     pub(super) fn of(rows: &[Coefficients]) -> Self {
@@ -319,13 +326,16 @@ impl List {
         are_moderate.then(|| [sine, both.after(count)])
     }
 
-    /// Creates coefficients from those that exist.
+    /// Creates coefficients from those that exist. `fill` writes all of them.
     fn filled<R>(count: usize, fill: impl FnOnce(&[Coefficients], &mut [Coefficients]) -> R) -> (Self, R) {
         COEFFICIENTS.with_borrow_mut(|all| {
-            let start = all.len();
-            all.resize(start + count, Coefficients::ZERO);
-            let (others, rows) = all.split_at_mut(start);
-            let found = fill(others, rows);
+            let start = all.used;
+            all.used += count;
+            if all.rows.len() < all.used {
+                all.rows.resize(2 * all.used, Coefficients::ZERO);
+            }
+            let (others, rows) = all.rows.split_at_mut(start);
+            let found = fill(others, &mut rows[..count]);
             let [start, count] = [start, count].map(|n| u32::try_from(n).expect("fewer than 2³² coefficients"));
             (Self { start, count }, found)
         })
@@ -344,7 +354,7 @@ impl List {
     }
 
     pub(super) fn with<R>(self, read: impl FnOnce(&[Coefficients]) -> R) -> R {
-        COEFFICIENTS.with_borrow(|all| read(&all[self.range()]))
+        COEFFICIENTS.with_borrow(|all| read(&all.rows[self.range()]))
     }
 
     pub(super) fn first(self) -> Option<Coefficients> {

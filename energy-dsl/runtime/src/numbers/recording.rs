@@ -60,9 +60,11 @@ impl Step {
     }
 }
 
-#[derive(Debug)]
+/// Most numbers are never computed.
+#[derive(Clone, Copy, Debug)]
 enum Recorded {
-    Known(Bundle),
+    /// Index among the bundles.
+    Known(u32),
     Open(Step),
 }
 
@@ -70,35 +72,43 @@ enum Recorded {
 #[derive(Debug)]
 pub(super) struct Recording {
     numbers: Vec<Recorded>,
+    bundles: Vec<Bundle>,
     /// Numbers that are being computed.
     wanted: Vec<u32>,
 }
 
 impl Recording {
     pub(super) const fn new() -> Self {
-        Self { numbers: Vec::new(), wanted: Vec::new() }
+        Self { numbers: Vec::new(), bundles: Vec::new(), wanted: Vec::new() }
     }
 
     pub(super) fn clear(&mut self) {
         self.numbers.clear();
+        self.bundles.clear();
     }
 
     pub(super) fn add(&mut self, number: Bundle) -> u32 {
-        self.push(Recorded::Known(number))
+        let known = self.known(number);
+        self.push(known)
     }
 
     pub(super) fn record(&mut self, step: Step) -> u32 {
         self.push(Recorded::Open(step))
     }
 
+    fn known(&mut self, number: Bundle) -> Recorded {
+        self.bundles.push(number);
+        Recorded::Known(index(self.bundles.len() - 1))
+    }
+
     fn push(&mut self, number: Recorded) -> u32 {
         self.numbers.push(number);
-        u32::try_from(self.numbers.len() - 1).expect("a routine has fewer than 2³² operations")
+        index(self.numbers.len() - 1)
     }
 
     fn found(&self, number: u32) -> Option<&Bundle> {
-        match &self.numbers[number as usize] {
-            Recorded::Known(bundle) => Some(bundle),
+        match self.numbers[number as usize] {
+            Recorded::Known(bundle) => Some(&self.bundles[bundle as usize]),
             Recorded::Open(_) => None,
         }
     }
@@ -118,10 +128,17 @@ impl Recording {
             };
             let [a, b] = step.operands();
             match [a, b].map(|operand| self.found(operand)) {
-                [Some(a), Some(b)] => self.numbers[next as usize] = Recorded::Known(step.of(a, b)),
+                [Some(a), Some(b)] => {
+                    let found = step.of(a, b);
+                    self.numbers[next as usize] = self.known(found);
+                }
                 [None, _] => self.wanted.push(a),
                 [_, None] => self.wanted.push(b),
             }
         }
     }
+}
+
+fn index(number: usize) -> u32 {
+    u32::try_from(number).expect("a routine has fewer than 2³² operations")
 }

@@ -120,7 +120,8 @@ impl Rows {
     /// Returns whether the sum has one row for each power of both.
     pub(super) fn overlaps(&self, other: &Self) -> bool {
         let step = self.first.power - other.first.power;
-        self.first.logs == other.first.logs && step == step.round() && step.abs() <= length() as f64
+        // Most steps are 0, and rounding is a call.
+        self.first.logs == other.first.logs && (step == 0.0 || step == step.round() && step.abs() <= length() as f64)
     }
 
     fn computed(first: Order, rows: usize, is_exact: bool, operation: Operation<List>) -> Option<Self> {
