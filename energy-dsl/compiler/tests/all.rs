@@ -3,6 +3,7 @@
 
 mod golden;
 mod language;
+mod random;
 mod range;
 mod rest_parts;
 mod run_time;

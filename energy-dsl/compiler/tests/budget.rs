@@ -10,6 +10,9 @@ use std::time::{Duration, Instant};
 
 use energy_compiler::{Budget, Interpreted, Limits, Phase, Textbook, compile, compile_file};
 use proc_macro2::Span;
+use random::Random;
+
+mod random;
 
 /// Longest time of a text on an idle machine.
 const LONGEST: Duration = Duration::from_secs(5);
@@ -233,17 +236,8 @@ fn a_compilation_is_watched_and_cancelled() {
     assert!(progress.steps > 0 && progress.steps < progress.limits.steps);
 }
 
-/// A small random number generator (xorshift).
-struct Random(u64);
-
+/// Random texts.
 impl Random {
-    fn below(&mut self, n: usize) -> usize {
-        self.0 ^= self.0 << 13;
-        self.0 ^= self.0 >> 7;
-        self.0 ^= self.0 << 17;
-        (self.0 % n as u64) as usize
-    }
-
     fn scalar(&mut self, depth: usize) -> String {
         if depth == 0 {
             return ["k", "p.x / L", "2", "norm(p - q) / L", "dot(q, r) / L^2"][self.below(5)].to_owned();

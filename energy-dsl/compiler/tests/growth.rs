@@ -6,18 +6,9 @@ use std::fmt::Write as _;
 use std::time::{Duration, Instant};
 
 use energy_compiler::Listing;
+use random::Random;
 
-/// A small random number generator (xorshift).
-struct Random(u64);
-
-impl Random {
-    fn below(&mut self, n: usize) -> usize {
-        self.0 ^= self.0 << 13;
-        self.0 ^= self.0 >> 7;
-        self.0 ^= self.0 << 17;
-        (self.0 % n as u64) as usize
-    }
-}
+mod random;
 
 /// A chain of `size` lets over `points` points, each a random operation on two of the values before it.
 fn program(size: usize, points: usize, seed: u64) -> String {

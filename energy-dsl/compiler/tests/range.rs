@@ -6,6 +6,8 @@
 use energy_compiler::{Interpreted, functions};
 use energy_runtime::{Float, Inputs, Mask};
 
+use crate::random::Random;
+
 /// Calls of a function `f` with a scalar result.
 const CALLS: [&str; 9] = [
     "f(x)",
@@ -42,25 +44,13 @@ const PRIMITIVES: [(&str, &str); 16] = [
 /// Inputs of each formula in an ordinary run.
 const INPUTS: usize = 3;
 
-/// Small random number generator (xorshift).
-struct Random(u64);
-
-impl Random {
-    fn bits(&mut self) -> u64 {
-        self.0 ^= self.0 << 13;
-        self.0 ^= self.0 >> 7;
-        self.0 ^= self.0 << 17;
-        self.0 >> 16
-    }
-
-    /// Returns 0, or a number of any sign and of a magnitude up to 10 to the power of `decades`.
-    fn number(&mut self, decades: f64) -> f64 {
-        let size = 10.0_f64.powf(decades * ((self.bits() % 2001) as f64 / 1000.0 - 1.0));
-        match self.bits() % 8 {
-            0 => 0.0,
-            1..4 => -size,
-            _ => size,
-        }
+/// Returns 0, or a number of any sign and of a magnitude up to 10 to the power of `decades`.
+fn number(random: &mut Random, decades: f64) -> f64 {
+    let size = 10.0_f64.powf(decades * (random.below(2001) as f64 / 1000.0 - 1.0));
+    match random.below(8) {
+        0 => 0.0,
+        1..4 => -size,
+        _ => size,
     }
 }
 
@@ -85,7 +75,7 @@ fn check<S: Float + Into<f64>>(element: &Interpreted, text: &str, decades: [f64;
     let coordinates = element.coordinates();
     let mut random = Random(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1);
     for decades in decades.into_iter().cycle().take(count) {
-        let numbers: Vec<S> = (0..=coordinates).map(|_| S::from_f64(random.number(decades))).collect();
+        let numbers: Vec<S> = (0..=coordinates).map(|_| S::from_f64(number(&mut random, decades))).collect();
         let inputs = Inputs { parameters: &numbers[..1], rest: &[], positions: &numbers[1..], velocities: &[] };
         for routine in ["value", "gradient", "hessian"] {
             let (blocks, flags) = element.routine(routine, &inputs).expect("no rest shape").expect("an energy");
