@@ -125,6 +125,7 @@ pub(super) fn local(g: &mut Graph, node: NodeId, order: Order) -> Local {
         | Op::IsModerate(..)
         | Op::PowerOfTwoScale(_)
         | Op::Less(..)
+        | Op::Precedes(..)
         | Op::LessOrEqual(..)
         | Op::Equal(..)
         | Op::And(..)

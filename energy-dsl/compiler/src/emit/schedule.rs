@@ -189,6 +189,7 @@ impl<'a> Schedule<'a> {
             }
             Op::PowerOfTwoScale(a) => method("power_of_two_scale", a, &[]),
             Op::Less(a, b) => method("less", a, &[b]),
+            Op::Precedes(a, b) => method("precedes", a, &[b]),
             Op::LessOrEqual(a, b) => method("less_or_equal", a, &[b]),
             Op::Equal(a, b) => method("equal", a, &[b]),
             Op::Select(mask, a, b) => {

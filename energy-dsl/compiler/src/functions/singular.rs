@@ -228,7 +228,7 @@ fn rotation(g: &mut Graph, a: &[NodeId], b: &[NodeId]) -> (NodeId, NodeId) {
     let root = g.sum_of_squares(&[difference, doubled]);
     let root = g.plain_sqrt(root);
     let (more, less) = (g.add(difference, root), g.sub(difference, root));
-    let falling = g.less(difference, zero);
+    let falling = g.precedes(difference, zero);
     let divisor = g.select(falling, less, more);
     let orthogonal = g.equal(divisor, zero);
     let tangent = g.div(doubled, divisor);
@@ -245,7 +245,7 @@ fn sorted(g: &mut Graph, mut columns: Vec<Column>) -> Vec<Column> {
     let mut lengths: Vec<NodeId> = columns.iter().map(|column| g.sum_of_squares(&column.image)).collect();
     let pairs: &[(usize, usize)] = if columns.len() == 2 { &[(0, 1)] } else { &[(0, 1), (1, 2), (0, 1)] };
     for &(p, q) in pairs {
-        let (a, b, swapped) = (columns[p].clone(), columns[q].clone(), g.less(lengths[p], lengths[q]));
+        let (a, b, swapped) = (columns[p].clone(), columns[q].clone(), g.precedes(lengths[p], lengths[q]));
         columns[p] = a.combine(&b, |a, b| g.select(swapped, b, a));
         columns[q] = a.combine(&b, |a, b| {
             let opposite = g.neg(a);
@@ -275,7 +275,7 @@ fn direction(g: &mut Graph, vector: &[NodeId], otherwise: &[NodeId]) -> (Vec<Nod
 fn perpendicular(g: &mut Graph, u: &[NodeId]) -> Vec<NodeId> {
     let (zero, half) = (g.constant(0.0), g.constant(0.5));
     let size = g.abs(u[0]);
-    let across = g.less(size, half);
+    let across = g.precedes(size, half);
     // u × e₁ or u × e₂.
     let (minus_y, minus_z) = (g.neg(u[1]), g.neg(u[2]));
     let candidates = [[zero, u[2], minus_y], [minus_z, zero, u[0]]];

@@ -138,6 +138,7 @@ fn apply<T: Number>(
         Op::PowerOfTwoScale(a) => n(a).power_of_two_scale(),
         Op::Select(mask, a, b) => T::select(m(mask), n(a), n(b)),
         Op::Less(a, b) => return Computed::Mask(n(a).less(n(b))),
+        Op::Precedes(a, b) => return Computed::Mask(n(a).precedes(n(b))),
         Op::LessOrEqual(a, b) => return Computed::Mask(n(a).less_or_equal(n(b))),
         Op::Equal(a, b) => return Computed::Mask(n(a).equal(n(b))),
         Op::IsModerate(a, degree) => return Computed::Mask(n(a).is_moderate(degree)),

@@ -8,6 +8,11 @@ impl Graph {
         self.node(Op::Less(a, b))
     }
 
+    /// Creates a < b, for results that are the same for both outcomes.
+    pub fn precedes(&mut self, a: NodeId, b: NodeId) -> NodeId {
+        self.node(Op::Precedes(a, b))
+    }
+
     /// Creates a ≤ b.
     pub fn less_or_equal(&mut self, a: NodeId, b: NodeId) -> NodeId {
         self.node(Op::LessOrEqual(a, b))

@@ -71,6 +71,8 @@ pub enum Op {
     PowerOfTwoScale(NodeId),
     /// a < b.
     Less(NodeId, NodeId),
+    /// a < b, where results are the same for both outcomes.
+    Precedes(NodeId, NodeId),
     /// a ≤ b.
     LessOrEqual(NodeId, NodeId),
     /// a = b.
@@ -120,6 +122,7 @@ impl Op {
             | Self::ProductError(a, b)
             | Self::RootError(a, b)
             | Self::Less(a, b)
+            | Self::Precedes(a, b)
             | Self::LessOrEqual(a, b)
             | Self::Equal(a, b)
             | Self::And(a, b)
@@ -163,6 +166,7 @@ impl Op {
             Self::ProductError(a, b) => Self::ProductError(to(a), to(b)),
             Self::RootError(a, b) => Self::RootError(to(a), to(b)),
             Self::Less(a, b) => Self::Less(to(a), to(b)),
+            Self::Precedes(a, b) => Self::Precedes(to(a), to(b)),
             Self::LessOrEqual(a, b) => Self::LessOrEqual(to(a), to(b)),
             Self::Equal(a, b) => Self::Equal(to(a), to(b)),
             Self::And(a, b) => Self::And(to(a), to(b)),
@@ -197,6 +201,7 @@ impl Op {
             Self::Truth(_)
                 | Self::Cautious
                 | Self::Less(..)
+                | Self::Precedes(..)
                 | Self::LessOrEqual(..)
                 | Self::Equal(..)
                 | Self::IsModerate(..)

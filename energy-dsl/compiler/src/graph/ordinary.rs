@@ -176,6 +176,7 @@ impl Path {
             Op::RootError(a, b) => g.root_error(d(a), d(b)),
             Op::PowerOfTwoScale(a) => g.power_of_two_scale(d(a)),
             Op::Less(a, b) => g.less(d(a), d(b)),
+            Op::Precedes(a, b) => g.precedes(d(a), d(b)),
             Op::LessOrEqual(a, b) => g.less_or_equal(d(a), d(b)),
             Op::Equal(a, b) => g.equal(d(a), d(b)),
             Op::IsModerate(a, degree) => g.is_moderate(d(a), degree),

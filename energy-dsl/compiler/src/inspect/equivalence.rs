@@ -125,6 +125,7 @@ fn rebuilt(g: &mut Graph, op: Op) -> NodeId {
         Op::PowerOfTwoScale(a) => g.power_of_two_scale(a),
         Op::Select(mask, a, b) => g.select(mask, a, b),
         Op::Less(a, b) => g.less(a, b),
+        Op::Precedes(a, b) => g.precedes(a, b),
         Op::LessOrEqual(a, b) => g.less_or_equal(a, b),
         Op::Equal(a, b) => g.equal(a, b),
         Op::IsModerate(a, degree) => g.is_moderate(a, degree),

@@ -173,6 +173,7 @@ pub(super) fn operation(op: Op) -> Operation {
         Op::NegMulSub(..) => Operation::NegMulSub,
         Op::PowerOfTwoScale(_) => Operation::PowerOfTwoScale,
         Op::Less(..) => Operation::Less,
+        Op::Precedes(..) => Operation::Precedes,
         Op::LessOrEqual(..) => Operation::LessOrEqual,
         Op::Equal(..) => Operation::Equal,
         Op::IsModerate(..) => Operation::IsModerate,

@@ -5,9 +5,10 @@
 
 use std::ops::Range;
 
+use super::comparisons::Comparison;
 use super::flags::{Flag, Flags};
 use super::narrow::{EVALUATIONS, Evaluated, Search, one_sided};
-use super::ray::{Along, Comparison, Found, Singular};
+use super::ray::{Along, Found, Singular};
 use super::real::{Mask, Number};
 use super::series::Limit;
 use super::unbounded::Unbounded;
@@ -156,6 +157,8 @@ struct Rays<'a> {
     paths: Vec<Path>,
     /// Whether all values are undefined along all rays, as those of √(−1).
     is_outside: bool,
+    /// Whether the formula is degenerate along all rays.
+    is_degenerate: bool,
 }
 
 /// Limits of one result along all rays.
@@ -200,7 +203,8 @@ impl<'a> Rays<'a> {
             end - size..end
         };
         let ranges: Vec<_> = roles.groups.iter().map(range).collect();
-        Self { inputs, roles, rounding, along, evaluated: ranges.len(), ranges, paths: Vec::new(), is_outside: true }
+        let (evaluated, paths) = (ranges.len(), Vec::new());
+        Self { inputs, roles, rounding, along, evaluated, ranges, paths, is_outside: true, is_degenerate: true }
     }
 
     fn routine(&self) -> Singular<'_> {
@@ -227,6 +231,7 @@ impl<'a> Rays<'a> {
             });
             self.evaluated = evaluated;
             for (slopes, Found { limits, comparisons }) in slopes.iter().zip(found) {
+                self.is_degenerate &= limits.is_none();
                 self.is_outside &= limits.as_ref().is_some_and(|limits| !self.is_inside(limits));
                 // If the value is undefined, so are its derivatives.
                 let limits = limits.filter(|limits| self.is_inside(limits)).unwrap_or_default();
@@ -269,11 +274,16 @@ impl<'a> Rays<'a> {
         self.ranges.iter().cloned().zip(self.scales()).map(group).collect()
     }
 
-    /// Returns whether a group has limits, or a result that each ray has its own number or infinity for.
-    fn is_scattered(&self, group: &Group<'_>) -> bool {
+    /// Returns whether more rays would tell nothing new of a group: it has limits, or two sides, or a result that each
+    /// ray has its own number or infinity for.
+    fn is_clear(&self, group: &Group<'_>) -> bool {
         let is_infinite = |i: usize| self.paths.iter().any(|path| matches!(path.limit(i), Limit::Infinite(_)));
         let is_scattered = |i: usize| is_infinite(i) || are_scattered(&self.relative(i, group.scale));
-        group.has_limits() || group.range.clone().any(is_scattered)
+        let has_sides = |i: usize| {
+            let numbers = self.relative(i, group.scale);
+            numbers.len() == self.paths.len() && are_two_sides(&numbers)
+        };
+        group.has_limits() || group.range.clone().any(is_scattered) || group.range.clone().all(has_sides)
     }
 
     /// Looks for rays into narrow regions where the formula takes another branch, with other results than those of these
@@ -285,7 +295,7 @@ impl<'a> Rays<'a> {
         let comparisons = one_sided(&rays);
         let reversed = routine.evaluate_reversed(&comparisons, &self.paths[0].slopes);
         let important = comparisons.iter().zip(reversed).filter_map(|(list, ray)| differs(ray).then_some(list[0]));
-        let important: Vec<usize> = important.collect();
+        let important: Vec<u32> = important.collect();
         let evaluations = EVALUATIONS / important.len().max(1);
         let found = important.into_iter().find_map(|comparison| {
             let found = Search { routine, moves, comparison, evaluations }.run(&rays);
@@ -317,7 +327,7 @@ impl<'a> Rays<'a> {
             }
         } else {
             for rays in [SOME, MANY] {
-                if groups[..self.evaluated].iter().all(|group| self.is_scattered(group)) {
+                if self.is_degenerate || groups[..self.evaluated].iter().all(|group| self.is_clear(group)) {
                     break;
                 }
                 self.cast(rays);
@@ -468,6 +478,12 @@ fn is_near(a: f64, b: f64) -> bool {
 /// ones for sixteen rays.
 fn are_scattered(numbers: &[f64]) -> bool {
     numbers.len() >= ENOUGH && 3 * sides(numbers) >= 2 * numbers.len()
+}
+
+/// Returns whether there are at most two numbers, neither of which a single ray has.
+fn are_two_sides(numbers: &[f64]) -> bool {
+    let first = numbers.iter().filter(|&&number| is_near(number, numbers[0])).count();
+    sides(numbers) <= 2 && first != 1 && first + 1 != numbers.len()
 }
 
 /// Returns how many of these numbers are different.

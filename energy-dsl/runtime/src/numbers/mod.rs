@@ -4,6 +4,7 @@
 mod block_sum;
 mod bundle;
 mod coefficients;
+mod comparisons;
 mod cpu;
 mod elementary;
 mod flags;

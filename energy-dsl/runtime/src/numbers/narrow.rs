@@ -6,8 +6,9 @@
 
 use std::cmp::Ordering;
 
+use super::comparisons::Comparison;
 use super::outcomes::LANES;
-use super::ray::{Comparison, Singular};
+use super::ray::Singular;
 use super::series::Term;
 
 /// Rays that the descents at one input may evaluate. Forty coordinates need 400 for one descent.
@@ -27,24 +28,25 @@ pub(super) struct Evaluated<'a> {
 
 /// Returns comparisons with the same outcome on all rays whose differences depend on the ray. Each entry lists all
 /// comparisons of one difference: those of a value and of its derivatives.
-pub(super) fn one_sided(rays: &[Evaluated<'_>]) -> Vec<Vec<usize>> {
+pub(super) fn one_sided(rays: &[Evaluated<'_>]) -> Vec<Vec<u32>> {
     let Some((first, rest)) = rays.split_first() else { return Vec::new() };
     if rest.iter().any(|ray| ray.comparisons.len() != first.comparisons.len()) {
         return Vec::new();
     }
-    let mut found: Vec<Vec<usize>> = Vec::new();
-    for number in 0..first.comparisons.len() {
-        let Some(term) = first.comparisons[number] else { continue };
+    let mut found: Vec<Vec<u32>> = Vec::new();
+    for (number, &term) in first.comparisons.iter().enumerate() {
+        let Some(term) = term else { continue };
         let others = || rest.iter().map(|ray| ray.comparisons[number]);
         let is_alike = others().all(|other| other.is_some_and(|other| other.is_negative() == term.is_negative()));
         let is_constant = others().all(|other| other.is_some_and(|other| other.is_near(term)));
         if !is_alike || is_constant {
             continue;
         }
-        let same = |ray: &Evaluated<'_>, a: usize| match (ray.comparisons[a], ray.comparisons[number]) {
+        let same = |ray: &Evaluated<'_>, a: u32| match (ray.comparisons[a as usize], ray.comparisons[number]) {
             (Some(a), Some(b)) => a.compare_size(b) == Ordering::Equal,
             _ => false,
         };
+        let number = u32::try_from(number).expect("comparisons are numbered so");
         match found.iter_mut().find(|copies| rays.iter().all(|ray| same(ray, copies[0]))) {
             Some(copies) => copies.push(number),
             None => found.push(vec![number]),
@@ -58,7 +60,7 @@ pub(super) struct Search<'a> {
     pub routine: Singular<'a>,
     pub moves: &'a [bool],
     /// Number of the comparison.
-    pub comparison: usize,
+    pub comparison: u32,
     /// Rays that may be evaluated.
     pub evaluations: usize,
 }
@@ -75,7 +77,7 @@ impl Search<'_> {
     pub(super) fn run(&self, rays: &[Evaluated<'_>]) -> Vec<Vec<f64>> {
         let mut starts: Vec<Point> = rays
             .iter()
-            .map(|ray| Point { slopes: ray.slopes.to_vec(), difference: ray.comparisons[self.comparison] })
+            .map(|ray| Point { slopes: ray.slopes.to_vec(), difference: ray.comparisons[self.comparison as usize] })
             .collect();
         starts.sort_by(|a, b| match (a.difference, b.difference) {
             (Some(a), Some(b)) => a.compare_size(b),
@@ -103,12 +105,8 @@ impl Search<'_> {
     }
 
     fn at_each(&self, rays: Vec<Vec<f64>>) -> Vec<Point> {
-        let comparisons = self.routine.compare(&rays);
-        let point = |(slopes, comparisons): (Vec<f64>, Vec<Comparison>)| Point {
-            difference: comparisons.get(self.comparison).copied().flatten(),
-            slopes,
-        };
-        rays.into_iter().zip(comparisons).map(point).collect()
+        let differences = self.routine.compare(self.comparison, &rays);
+        rays.into_iter().zip(differences).map(|(slopes, difference)| Point { slopes, difference }).collect()
     }
 
     fn moving(&self) -> impl Iterator<Item = usize> {

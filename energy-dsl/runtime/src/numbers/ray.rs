@@ -8,10 +8,11 @@ use std::ops::{Add, Div, Mul, Neg, Range, Sub};
 
 use super::bundle::{Bundle, rays, set_rays};
 use super::coefficients::List;
+use super::comparisons::{self, Comparison, reversed};
 use super::level::Level;
 use super::outcomes::{LANES, Outcomes};
 use super::real::{Mask, Number};
-use super::recording::{Recording, Step};
+use super::recording::{Recording, Step, compare, defined};
 use super::series::{LENGTHS, Limit, Term, with_length};
 use super::unbounded::Unbounded;
 
@@ -21,21 +22,14 @@ pub(super) type Along<'a> = &'a dyn Fn(&[Ray]) -> (Vec<Ray>, Outcomes);
 thread_local! {
     /// The numbers of the bundle that this thread is computing.
     static NUMBERS: RefCell<Recording> = const { RefCell::new(Recording::new()) };
-    /// The comparisons of the bundle that this thread is computing, in order of evaluation.
-    static COMPARISONS: RefCell<Vec<[Comparison; LANES]>> = const { RefCell::new(Vec::new()) };
-    /// Comparisons whose outcomes are reversed, and along which rays.
-    static REVERSED: RefCell<Vec<(usize, Outcomes)>> = const { RefCell::new(Vec::new()) };
 }
-
-/// A comparison of two numbers along a ray: the largest term of their difference; `None` if that is 0 or undefined.
-pub(super) type Comparison = Option<Term>;
 
 /// Results of a routine along a ray.
 #[derive(Clone, Debug)]
 pub(super) struct Found {
     /// Limits of the results, or of the first groups of them; `None` if the formula is degenerate along the ray.
     pub limits: Option<Vec<Limit>>,
-    /// All comparisons but tests of equality. Routines do not branch, so all rays have the same ones.
+    /// All comparisons whose outcomes may matter. Routines do not branch, so all rays have the same ones.
     pub comparisons: Vec<Comparison>,
 }
 
@@ -65,7 +59,7 @@ impl Singular<'_> {
 
     fn evaluate_bundle(self, slopes: &[&Vec<f64>], goes_on: &mut dyn FnMut(usize, &[Found]) -> bool) -> Vec<Found> {
         let [short, longer @ ..] = LENGTHS;
-        let mut found = self.evaluate_to(short, slopes, goes_on);
+        let mut found = self.evaluate_to(short, slopes, None, goes_on);
         for length in longer {
             let open: Vec<usize> = (0..slopes.len()).filter(|&ray| found[ray].is_open()).collect();
             if open.is_empty() {
@@ -73,37 +67,39 @@ impl Singular<'_> {
             }
             let slopes: Vec<&Vec<f64>> = open.iter().map(|&ray| slopes[ray]).collect();
             open.into_iter()
-                .zip(self.evaluate_to(length, &slopes, goes_on))
+                .zip(self.evaluate_to(length, &slopes, None, goes_on))
                 .for_each(|(ray, longer)| found[ray] = longer);
         }
         found
     }
 
     /// Returns what the routine would compute along a ray if the comparisons of each list had the other outcome.
-    pub(super) fn evaluate_reversed(self, lists: &[Vec<usize>], slopes: &Vec<f64>) -> Vec<Found> {
-        let bundle = |lists: &[Vec<usize>]| {
+    pub(super) fn evaluate_reversed(self, lists: &[Vec<u32>], slopes: &Vec<f64>) -> Vec<Found> {
+        let bundle = |lists: &[Vec<u32>]| {
             let rays = (0..lists.len()).map(Outcomes::only);
-            let reversed = lists.iter().zip(rays).flat_map(|(list, ray)| list.iter().map(move |&c| (c, ray)));
-            REVERSED.set(reversed.collect());
-            let found = self.evaluate_to(LENGTHS[0], &vec![slopes; lists.len()], &mut |_, _| true);
-            REVERSED.take();
-            found
+            let outcomes = lists.iter().zip(rays).flat_map(|(list, ray)| list.iter().map(move |&c| (c, ray)));
+            let slopes = vec![slopes; lists.len()];
+            reversed(outcomes.collect(), || self.evaluate_to(LENGTHS[0], &slopes, None, &mut |_, _| true))
         };
         lists.chunks(LANES).flat_map(bundle).collect()
     }
 
-    /// Returns the comparisons at x + slope · ε for the slopes of each ray. No result is computed.
-    pub(super) fn compare(self, slopes: &[Vec<f64>]) -> Vec<Vec<Comparison>> {
+    /// Returns a comparison at x + slope · ε for the slopes of each ray. No result is computed.
+    pub(super) fn compare(self, comparison: u32, slopes: &[Vec<f64>]) -> Vec<Comparison> {
         let slopes: Vec<&Vec<f64>> = slopes.iter().collect();
         let without_results = Self { groups: &[], ..self };
-        let bundle = |slopes: &[&Vec<f64>]| without_results.evaluate_to(LENGTHS[0], slopes, &mut |_, _| false);
-        slopes.chunks(LANES).flat_map(bundle).map(|found| found.comparisons).collect()
+        let bundle =
+            |slopes: &[&Vec<f64>]| without_results.evaluate_to(LENGTHS[0], slopes, Some(comparison), &mut |_, _| false);
+        let this = |found: Found| found.comparisons.get(comparison as usize).copied().flatten();
+        slopes.chunks(LANES).flat_map(bundle).map(this).collect()
     }
 
+    /// Evaluates the rays of one bundle: a comparison, then group after group while `goes_on`.
     fn evaluate_to(
         self,
         length: usize,
         slopes: &[&Vec<f64>],
+        comparison: Option<u32>,
         goes_on: &mut dyn FnMut(usize, &[Found]) -> bool,
     ) -> Vec<Found> {
         set_rays(slopes.len());
@@ -111,11 +107,11 @@ impl Singular<'_> {
             let of_input = |i: usize| slopes.iter().map(|slopes| slopes[i]).collect::<Vec<f64>>();
             let input = |i: usize| Ray::new(Bundle::linear(self.inputs[i], &of_input(i)));
             let (results, degenerate) = (self.along)(&(0..self.inputs.len()).map(input).collect::<Vec<_>>());
-            let comparisons = COMPARISONS.take();
-            let nothing = |ray: usize| Found {
-                limits: (!degenerate.lane(ray)).then(Vec::new),
-                comparisons: comparisons.iter().map(|terms| terms[ray]).collect(),
-            };
+            if let Some(comparison) = comparison {
+                NUMBERS.with_borrow_mut(|all| all.make(comparison));
+            }
+            let nothing =
+                |ray: usize| Found { limits: (!degenerate.lane(ray)).then(Vec::new), comparisons: Vec::new() };
             let mut found: Vec<Found> = (0..slopes.len()).map(nothing).collect();
             for (number, group) in self.groups.iter().enumerate() {
                 for result in &results[group.clone()] {
@@ -125,6 +121,8 @@ impl Singular<'_> {
                     break;
                 }
             }
+            let comparisons = comparisons::take(slopes.len());
+            found.iter_mut().zip(comparisons).for_each(|(found, comparisons)| found.comparisons = comparisons);
             found
         });
         NUMBERS.with_borrow_mut(Recording::clear);
@@ -156,31 +154,13 @@ impl Ray {
         Self(NUMBERS.with_borrow_mut(|all| all.record(step)))
     }
 
-    /// Returns the signs of self − other along each ray; NaN if one is undefined.
-    fn against(self, other: Self) -> [f64; LANES] {
+    /// Returns the rays along which self < other, and those along which they are equal.
+    fn against(self, other: Self) -> [Outcomes; 2] {
         NUMBERS.with_borrow_mut(|all| {
             let [a, b] = all.each([self.0, other.0]);
-            let signs = compared(&a.minus(b));
-            std::array::from_fn(|ray| if a.is_defined(ray) && b.is_defined(ray) { signs[ray] } else { f64::NAN })
+            compare(comparisons::register(), a, b)
         })
     }
-}
-
-/// Records a comparison of a difference with 0 and returns the signs, or the other signs if the outcome is reversed.
-fn compared(difference: &Bundle) -> [f64; LANES] {
-    let terms: [Comparison; LANES] = difference.first();
-    let number = COMPARISONS.with_borrow_mut(|all| {
-        all.push(terms);
-        all.len() - 1
-    });
-    let is_reversed = |all: &Vec<(usize, Outcomes)>| {
-        let of_this = all.iter().filter(|(reversed, _)| *reversed == number);
-        of_this.fold(Outcomes::none(), |rays, (_, ray)| rays | *ray)
-    };
-    let reversed = REVERSED.with_borrow(is_reversed);
-    let sign =
-        |ray: usize| terms[ray].map_or(0.0, |term| if term.is_negative() != reversed.lane(ray) { -1.0 } else { 1.0 });
-    std::array::from_fn(sign)
 }
 
 macro_rules! operator {
@@ -217,23 +197,19 @@ impl Number for Ray {
         *self = value;
     }
     fn from_f64(value: f64) -> Self {
-        Self::new(Bundle::number(value))
+        Self(NUMBERS.with_borrow_mut(|all| all.constant(value)))
     }
     fn sqrt(self) -> Self {
         Self::after(Step::Root(self.0))
     }
     fn abs(self) -> Self {
-        let signs = NUMBERS.with_borrow_mut(|all| {
-            let [number] = all.each([self.0]);
-            compared(number)
-        });
-        Self::after(Step::Signed(self.0, Outcomes::of(|ray| signs[ray] < 0.0)))
+        Self::after(Step::Size(self.0, comparisons::register()))
     }
     fn min(self, other: Self) -> Self {
-        Self::select(other.less(self), other, self)
+        Self::after(Step::Smaller(self.0, other.0, comparisons::register()))
     }
     fn max(self, other: Self) -> Self {
-        Self::select(self.less(other), other, self)
+        Self::after(Step::Larger(self.0, other.0, comparisons::register()))
     }
     fn sin<L: Level>(self) -> Self {
         Self::after(Step::Sin(self.0))
@@ -267,18 +243,24 @@ impl Number for Ray {
         Self::from_f64(1.0)
     }
     fn less(self, other: Self) -> Outcomes {
-        let signs = self.against(other);
-        Outcomes::of(|ray| signs[ray] < 0.0)
+        self.against(other)[0]
     }
     fn less_or_equal(self, other: Self) -> Outcomes {
-        let signs = self.against(other);
-        Outcomes::of(|ray| signs[ray] <= 0.0)
+        let [less, equal] = self.against(other);
+        less | equal
+    }
+    fn precedes(self, other: Self) -> Outcomes {
+        NUMBERS.with_borrow_mut(|all| {
+            let [a, b] = all.each([self.0, other.0]);
+            let first = a.minus(b).first();
+            defined(a, b) & Outcomes::of(|ray| first[ray].is_some_and(Term::is_negative))
+        })
     }
     fn equal(self, other: Self) -> Outcomes {
         NUMBERS.with_borrow_mut(|all| {
             let [a, b] = all.each([self.0, other.0]);
             let first = a.minus(b).first();
-            Outcomes::of(|ray| a.is_defined(ray) && b.is_defined(ray) && first[ray].is_none())
+            defined(a, b) & Outcomes::of(|ray| first[ray].is_none())
         })
     }
     fn select(mask: Outcomes, yes: Self, no: Self) -> Self {
@@ -388,7 +370,8 @@ mod tests {
             let group = 0..1;
             let routine = Singular { inputs: &zeros, along: &along, groups: std::slice::from_ref(&group) };
             let rays: Vec<&Vec<f64>> = slopes.iter().collect();
-            let [short, rows, series] = LENGTHS.map(|length| routine.evaluate_to(length, &rays, &mut |_, _| true));
+            let [short, rows, series] =
+                LENGTHS.map(|length| routine.evaluate_to(length, &rays, None, &mut |_, _| true));
             // Where short rows tell nothing, they say so.
             let is_short = short.iter().any(Found::is_open);
             let rows = if is_short { rows } else { [short, rows].concat() };

@@ -148,6 +148,10 @@ pub trait Number:
     }
     /// Returns self < other.
     fn less(self, other: Self) -> Self::Mask;
+    /// Returns self < other, where results are the same for both outcomes.
+    fn precedes(self, other: Self) -> Self::Mask {
+        self.less(other)
+    }
     /// Returns self ≤ other.
     fn less_or_equal(self, other: Self) -> Self::Mask;
     /// Returns self = other.

@@ -4,6 +4,7 @@
 //! values tell that there is no limit, no derivative is computed.
 
 use super::bundle::Bundle;
+use super::comparisons;
 use super::outcomes::Outcomes;
 
 /// How a number follows from earlier ones.
@@ -24,6 +25,11 @@ pub(super) enum Step {
     /// The number with another sign along some rays.
     Signed(u32, Outcomes),
     Select(Outcomes, u32, u32),
+    /// The size of a number; the comparison with 0.
+    Size(u32, u32),
+    /// The larger and the smaller of two numbers; their comparison.
+    Larger(u32, u32, u32),
+    Smaller(u32, u32, u32),
 }
 
 impl Step {
@@ -35,8 +41,26 @@ impl Step {
             | Self::Over(a, b)
             | Self::Power(a, b)
             | Self::Angle(a, b)
-            | Self::Select(_, a, b) => [a, b],
-            Self::Root(a) | Self::Exp(a) | Self::Ln(a) | Self::Sin(a) | Self::Cos(a) | Self::Signed(a, _) => [a, a],
+            | Self::Select(_, a, b)
+            | Self::Larger(a, b, _)
+            | Self::Smaller(a, b, _) => [a, b],
+            Self::Root(a)
+            | Self::Exp(a)
+            | Self::Ln(a)
+            | Self::Sin(a)
+            | Self::Cos(a)
+            | Self::Signed(a, _)
+            | Self::Size(a, _) => [a, a],
+        }
+    }
+
+    /// Returns the comparison that the step makes.
+    fn comparison(self) -> Option<u32> {
+        match self {
+            Self::Size(_, comparison) | Self::Larger(_, _, comparison) | Self::Smaller(_, _, comparison) => {
+                Some(comparison)
+            }
+            _ => None,
         }
     }
 
@@ -56,8 +80,22 @@ impl Step {
             Self::Cos(_) => a.cos(),
             Self::Signed(_, negative) => a.signed(negative),
             Self::Select(outcomes, ..) => Bundle::select(outcomes, a, b),
+            Self::Size(_, comparison) => a.signed(comparisons::compare(comparison, a)[0]),
+            Self::Larger(_, _, comparison) => Bundle::select(compare(comparison, a, b)[0], b, a),
+            Self::Smaller(_, _, comparison) => Bundle::select(compare(comparison, b, a)[0], b, a),
         }
     }
+}
+
+/// Returns the rays along which both numbers are defined and a < b, and those along which a = b.
+pub(super) fn compare(comparison: u32, a: &Bundle, b: &Bundle) -> [Outcomes; 2] {
+    let defined = defined(a, b);
+    comparisons::compare(comparison, &a.minus(b)).map(|rays| rays & defined)
+}
+
+/// Returns the rays along which both numbers are defined.
+pub(super) fn defined(a: &Bundle, b: &Bundle) -> Outcomes {
+    Outcomes::of(|ray| a.is_defined(ray) && b.is_defined(ray))
 }
 
 /// Most numbers are never computed.
@@ -75,16 +113,30 @@ pub(super) struct Recording {
     bundles: Vec<Bundle>,
     /// Numbers that are being computed.
     wanted: Vec<u32>,
+    /// The numbers 0 and 1. Many are errors of rounding, or scales.
+    zero: Option<u32>,
+    one: Option<u32>,
 }
 
 impl Recording {
     pub(super) const fn new() -> Self {
-        Self { numbers: Vec::new(), bundles: Vec::new(), wanted: Vec::new() }
+        Self { numbers: Vec::new(), bundles: Vec::new(), wanted: Vec::new(), zero: None, one: None }
     }
 
     pub(super) fn clear(&mut self) {
         self.numbers.clear();
         self.bundles.clear();
+        (self.zero, self.one) = (None, None);
+    }
+
+    pub(super) fn constant(&mut self, value: f64) -> u32 {
+        let known = if value == 0.0 { self.zero } else { self.one.filter(|_| value == 1.0) };
+        known.unwrap_or_else(|| {
+            let number = self.add(Bundle::number(value));
+            self.zero = self.zero.or((value == 0.0).then_some(number));
+            self.one = self.one.or((value == 1.0).then_some(number));
+            number
+        })
     }
 
     pub(super) fn add(&mut self, number: Bundle) -> u32 {
@@ -93,7 +145,12 @@ impl Recording {
     }
 
     pub(super) fn record(&mut self, step: Step) -> u32 {
-        self.push(Recorded::Open(step))
+        match step {
+            Step::Plus(a, zero) | Step::Plus(zero, a) | Step::Minus(a, zero) if Some(zero) == self.zero => a,
+            Step::Times(a, one) | Step::Times(one, a) | Step::Over(a, one) if Some(one) == self.one => a,
+            Step::Select(_, a, b) if a == b => a,
+            _ => self.push(Recorded::Open(step)),
+        }
     }
 
     fn known(&mut self, number: Bundle) -> Recorded {
@@ -117,6 +174,14 @@ impl Recording {
     pub(super) fn each<const N: usize>(&mut self, numbers: [u32; N]) -> [&Bundle; N] {
         numbers.into_iter().for_each(|number| self.compute(number));
         numbers.map(|number| self.found(number).expect("the number is computed"))
+    }
+
+    /// Makes a comparison that nothing has asked for.
+    pub(super) fn make(&mut self, comparison: u32) {
+        let makes = |number: &Recorded| matches!(number, Recorded::Open(step) if step.comparison() == Some(comparison));
+        if let Some(number) = self.numbers.iter().position(makes) {
+            self.compute(index(number));
+        }
     }
 
     fn compute(&mut self, number: u32) {

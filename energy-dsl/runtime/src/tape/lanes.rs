@@ -71,7 +71,7 @@ macro_rules! define_run {
                             at += lanes;
                         }
                     })*
-                    Operation::Less => {
+                    Operation::Less | Operation::Precedes => {
                         masks[target] = bits!(|at| load::<S, L>(slots, i, at).less(load::<S, L>(slots, j, at)),
                             ELEMENTS, lanes);
                     }

@@ -94,6 +94,8 @@ macro_rules! define {
             $($(#[$docs])* $name,)*
             /// The mask a < b.
             Less,
+            /// The mask a < b, where results are the same for both outcomes.
+            Precedes,
             /// The mask a ≤ b.
             LessOrEqual,
             /// The mask a = b.

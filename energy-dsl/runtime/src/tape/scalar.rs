@@ -84,6 +84,7 @@ macro_rules! define_step {
                     return;
                 })*
                 Operation::Less => values.number(first).less(values.number(second)),
+                Operation::Precedes => values.number(first).precedes(values.number(second)),
                 Operation::LessOrEqual => values.number(first).less_or_equal(values.number(second)),
                 Operation::Equal => values.number(first).equal(values.number(second)),
                 Operation::IsModerate => values.number(first).is_moderate(second.to_le_bytes()[0]),
