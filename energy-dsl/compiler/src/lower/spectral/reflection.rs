@@ -181,7 +181,7 @@ impl DividedDifference {
     /// Returns the larger one b of x and x′, and r, with which the other one is b (1 + r).
     fn relative_step(&mut self, g: &mut Graph, x: NodeId) -> (NodeId, NodeId) {
         let (step, image) = (self.step(g, x), self.image.of(g, x));
-        let larger = g.less(image, x);
+        let larger = g.precedes(image, x);
         let opposite = g.neg(step);
         let (base, step) = (g.select(larger, x, image), g.select(larger, opposite, step));
         (base, g.div(step, base))
@@ -239,8 +239,8 @@ impl DividedDifference {
         let (size, length) = (g.sum(sizes), g.sum(lengths));
         let size = g.min(size, one);
         let limit = g.mul(short, size);
-        let close = g.less_or_equal(length, limit);
-        g.select(close, near, far)
+        let apart = g.precedes(limit, length);
+        g.select(apart, far, near)
     }
 }
 
