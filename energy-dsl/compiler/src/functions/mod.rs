@@ -199,6 +199,18 @@ pub const RECOGNISERS: &[Recogniser] = &[
         recognise: remainder::recognise_difference,
     },
     Recogniser {
+        spelling: "1 - exp(-x) * (1 + x), 1 - exp(-x) - x * exp(-x), …",
+        form: "the regularised incomplete gamma function of an integer",
+        ending: Ending::WrittenDifference,
+        recognise: remainder::recognise_damped_difference,
+    },
+    Recogniser {
+        spelling: "exp(-x) * (1 + x + x^2/2) - 1, …",
+        form: "the regularised incomplete gamma function of an integer",
+        ending: Ending::WrittenSum,
+        recognise: remainder::recognise_damped_sum,
+    },
+    Recogniser {
         spelling: "cos(x) - 1 + x^2/2, -sin(x) + x, …",
         form: "the rest of the Taylor series at 0",
         ending: Ending::WrittenSum,

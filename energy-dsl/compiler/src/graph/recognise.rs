@@ -50,6 +50,8 @@ pub enum Expansion {
     Logarithm,
     /// sin x and cos x.
     Trigonometric,
+    /// 1 − e⁻ˣ Σ xʲ/j!, the regularised incomplete gamma function of an integer.
+    IncompleteGamma,
 }
 
 impl Graph {

@@ -56,6 +56,12 @@ impl Monomial {
         }
     }
 
+    /// Returns the monomial times a number.
+    pub(super) fn scaled(mut self, number: f64) -> Self {
+        self.coefficient *= number;
+        self
+    }
+
     /// Returns self · other^power.
     pub(super) fn times(&self, other: &Self, power: i32) -> Self {
         let mut product = self.clone();

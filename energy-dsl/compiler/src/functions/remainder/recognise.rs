@@ -7,11 +7,11 @@ use super::series::{constant_term, remainder, successor, whole_remainder};
 use crate::graph::{Expansion, Graph, NodeId, Op, Primitive};
 
 /// Terms of a sum that are searched.
-const MOST_TERMS: usize = 12;
+pub(super) const MOST_TERMS: usize = 12;
 /// Order of the largest remainder.
-const LARGEST_ORDER: u32 = 12;
+pub(super) const LARGEST_ORDER: u32 = 12;
 /// Coefficients that differ by this part are equal: each is rounded a few times.
-const SAME: f64 = 1e-15;
+pub(super) const SAME: f64 = 1e-15;
 
 /// A node that is sign · xᵖ Φₖ(x).
 #[derive(Clone, Copy)]
@@ -93,7 +93,7 @@ fn functions_of(g: &Graph, product: NodeId, found: &mut Vec<Function>) {
 }
 
 /// Returns the first factors of a product, above its divisors.
-fn factors(g: &Graph, product: NodeId) -> Vec<NodeId> {
+pub(super) fn factors(g: &Graph, product: NodeId) -> Vec<NodeId> {
     let (mut open, mut found) = (vec![product], Vec::new());
     for _ in 0..MOST_FACTORS {
         let Some(node) = open.pop() else { break };
@@ -110,10 +110,7 @@ fn factors(g: &Graph, product: NodeId) -> Vec<NodeId> {
 fn reduced(g: &Graph, sum: &[(NodeId, f64)], function: Function) -> Option<(Function, Monomial)> {
     let lengths = lengths(g, function.x);
     let x = Monomial::of(g, function.x, &lengths);
-    let signed = |node: NodeId, sign: f64| {
-        let term = Monomial::of(g, node, &lengths);
-        Monomial { coefficient: sign * term.coefficient, ..term }
-    };
+    let signed = |node: NodeId, sign: f64| Monomial::of(g, node, &lengths).scaled(sign);
     let (own, sign) = own_term(g, sum, function.node)?;
     let mut factor = signed(own, sign).without_power(function.node)?;
     // The function is sign · xᵖ Φₖ: moves powers of x into it.
@@ -166,7 +163,7 @@ fn after_head(function: Function, mut head: Vec<(u32, f64)>) -> Option<(u32, f64
             return None;
         }
         head.retain(|(power, _)| *power != k);
-        let (next, turned) = successor(function.expansion, k);
+        let (next, turned) = successor(function.expansion, k)?;
         (k, sign) = (next, sign * turned);
     }
     (k > function.k).then_some((k, sign))

@@ -12,6 +12,11 @@ fn exponential_below(k: u32) -> f64 {
     f64::from(k.clamp(2, 4))
 }
 
+/// The median of the gamma distribution, beyond which 1 − e⁻ˣ Σ xʲ/j! does not cancel.
+fn damped_below(k: u32) -> f64 {
+    f64::from(k.max(2))
+}
+
 fn trigonometric_below(k: u32) -> f64 {
     f64::from((k + 1).clamp(3, 6))
 }
@@ -25,16 +30,17 @@ fn factorial(n: u32) -> f64 {
 pub(super) fn constant_term(expansion: Expansion, k: u32) -> f64 {
     match expansion {
         Expansion::Logarithm => 1.0 / f64::from(k),
-        Expansion::Exponential | Expansion::Trigonometric => 1.0 / factorial(k),
+        Expansion::Exponential | Expansion::Trigonometric | Expansion::IncompleteGamma => 1.0 / factorial(k),
     }
 }
 
-/// Returns k′ and the sign s of xᵏ Φₖ = xᵏ Φₖ(0) + s xᵏ′ Φₖ′.
-pub(super) fn successor(expansion: Expansion, k: u32) -> (u32, f64) {
+/// Returns k′ and the sign s of xᵏ Φₖ = xᵏ Φₖ(0) + s xᵏ′ Φₖ′; `None` if that is of another family.
+pub(super) fn successor(expansion: Expansion, k: u32) -> Option<(u32, f64)> {
     match expansion {
-        Expansion::Exponential => (k + 1, 1.0),
-        Expansion::Logarithm => (k + 1, -1.0),
-        Expansion::Trigonometric => (k + 2, -1.0),
+        Expansion::Exponential => Some((k + 1, 1.0)),
+        Expansion::Logarithm => Some((k + 1, -1.0)),
+        Expansion::Trigonometric => Some((k + 2, -1.0)),
+        Expansion::IncompleteGamma => None,
     }
 }
 
@@ -46,7 +52,8 @@ pub(super) fn remainder(g: &mut Graph, expansion: Expansion, k: u32, x: NodeId) 
 }
 
 /// Creates xᵏ Φₖ(x), k > 1, with its derivatives xᵏ⁻¹ Φₖ₋₁ and xᵏ⁻² Φₖ₋₂; those of the logarithm are xᵏ⁻¹/(1 + x) and
-/// xᵏ⁻² (k − 1 + (k − 2) x)/(1 + x)².
+/// xᵏ⁻² (k − 1 + (k − 2) x)/(1 + x)², those of the incomplete gamma function xᵏ⁻¹ e⁻ˣ/(k − 1)! and
+/// xᵏ⁻² (k − 1 − x) e⁻ˣ/(k − 1)!.
 pub(super) fn whole_remainder(g: &mut Graph, expansion: Expansion, k: u32, x: NodeId) -> NodeId {
     let powers = [k, k - 1, k - 2].map(|exponent| {
         let exponent = g.constant(f64::from(exponent));
@@ -61,6 +68,12 @@ pub(super) fn whole_remainder(g: &mut Graph, expansion: Expansion, k: u32, x: No
             let (scaled, square) = (g.mul(least, x), g.mul(reciprocal, reciprocal));
             let linear = g.add(less, scaled);
             [value, reciprocal, g.mul(linear, square)]
+        }
+        Expansion::IncompleteGamma => {
+            let (value, decay) = (derivatives(g, expansion, k, x)[0], decay(g, x));
+            let (number, less) = (g.constant(1.0 / factorial(k - 1)), g.constant(f64::from(k - 1)));
+            let (first, linear) = (g.mul(number, decay), g.sub(less, x));
+            [value, first, g.mul(linear, first)]
         }
         _ => [k, k - 1, k - 2].map(|k| value(g, expansion, k, x)),
     };
@@ -103,6 +116,10 @@ fn derivatives(g: &mut Graph, expansion: Expansion, k: u32, x: NodeId) -> [NodeI
             }
             near_or_far(g, x, trigonometric_below(k), near, far)
         }
+        (Expansion::IncompleteGamma, _) => {
+            let (near, far) = (damped_near(g, k, x), damped_far(g, k, x));
+            near_or_far(g, x, damped_below(k), near, far)
+        }
     }
 }
 
@@ -118,6 +135,22 @@ fn exponential_near(g: &mut Graph, k: u32, x: NodeId) -> [NodeId; 3] {
     [0, 1, 2].map(|order| {
         let coefficient = |j: u32| falling(j + order, order) / factorial(j + order + k);
         polynomial(g, x, economised(coefficient, Interval::AroundZero(exponential_below(k))))
+    })
+}
+
+/// Returns e⁻ˣ.
+fn decay(g: &mut Graph, x: NodeId) -> NodeId {
+    let opposite = g.neg(x);
+    g.exp(opposite)
+}
+
+/// γₖ = e⁻ˣ φₖ, γₖ′ = −k γₖ₊₁ and γₖ″ = k (k + 1) γₖ₊₂. No terms of these series cancel if x > 0.
+fn damped_near(g: &mut Graph, k: u32, x: NodeId) -> [NodeId; 3] {
+    let decay = decay(g, x);
+    let interval = || Interval::AroundZero(damped_below(k));
+    [(0, 1.0), (1, -f64::from(k)), (2, f64::from(k * (k + 1)))].map(|(order, factor)| {
+        let series = polynomial(g, x, economised(|j| factor / factorial(j + order + k), interval()));
+        g.mul(decay, series)
     })
 }
 
@@ -172,6 +205,27 @@ fn exponential_far(g: &mut Graph, k: u32, x: NodeId) -> [NodeId; 3] {
         let rest = g.plain_difference(last[1], constant);
         g.div(rest, x)
     })
+}
+
+/// γₖ and its derivatives by γ₀ = 1 and γⱼ₊₁ = (γⱼ − e⁻ˣ/j!)/x, x γₖ′ = e⁻ˣ/(k − 1)! − k γₖ and
+/// x γₖ″ = −e⁻ˣ/(k − 1)! − (k + 1) γₖ′.
+fn damped_far(g: &mut Graph, k: u32, x: NodeId) -> [NodeId; 3] {
+    let (decay, mut value) = (decay(g, x), g.constant(1.0));
+    let mut term = decay;
+    for j in 0..k {
+        let number = g.constant(1.0 / factorial(j));
+        term = g.mul(number, decay);
+        let rest = g.plain_difference(value, term);
+        value = g.div(rest, x);
+    }
+    let (factor, more) = (g.constant(f64::from(k)), g.constant(f64::from(k + 1)));
+    let scaled = g.mul(factor, value);
+    let difference = g.plain_difference(term, scaled);
+    let slope = g.div(difference, x);
+    let scaled = g.mul(more, slope);
+    let sum = g.add(term, scaled);
+    let curvature = g.div(sum, x);
+    [value, slope, g.neg(curvature)]
 }
 
 /// cₖ and its derivatives by cⱼ₊₁ = (1/(j − 1)! − cⱼ₋₁)/x².
