@@ -338,3 +338,25 @@ fn errors_in_double_precision_are_within_the_condition() {
 fn errors_in_single_precision_are_within_the_condition() {
     all_within::<f32>(2.0_f64.powi(-24), 3.0, 7.0, 60);
 }
+
+/// Of 10⁵ matrices, the one whose rotation takes the most steps: κ = 1.6e13, nearly a mirror image.
+#[test]
+fn the_slowest_refinement_converges() {
+    let entries = [
+        -49_068_264_790.600_174,
+        -10_974_649_391.859_84,
+        124_814_796_806.436_14,
+        122_838_891_748.694_3,
+        67_391_510_708.432_19,
+        -12_370_729_742.532_782,
+        -16_663_666_172.713_287,
+        -154_990_792_269.807_6,
+        77_236_823_374.584_84,
+    ];
+    let mut worst = Worst::default();
+    let flagged = compare::<f64>(&Subjects::new(), entries, 2.0_f64.powi(-53), true, &mut worst);
+    for (what, error, place) in &worst.0 {
+        assert!(*error <= 1.0, "{what}: {error:.3} times the bound, at {place}");
+    }
+    assert!(!flagged);
+}

@@ -6,7 +6,7 @@ use super::coordinates::Coordinates;
 use super::forward::{Sparse, products, tangents};
 use super::local::{Order, local};
 use super::{accumulate, differentiable};
-use crate::graph::{Graph, NodeId, Op};
+use crate::graph::{Contraction, Graph, NodeId, Op, upper};
 
 /// Nodes and their weights.
 pub(super) type Weighted = BTreeMap<NodeId, NodeId>;
@@ -82,8 +82,19 @@ pub(super) fn second_derivatives(
     let adjoints = adjoints(g, outputs, coordinates, Order::Second);
     let mut hessian: BTreeMap<usize, NodeId> = BTreeMap::new();
     let none = Sparse::new();
+    let contractions = g.contractions_of(|value| nodes.contains(&value) && !coordinates.seeds.contains_key(&value));
+    for Contraction { values, arguments, factors, second } in &contractions {
+        let zero = g.constant(0.0);
+        let weights: Vec<NodeId> = values.iter().map(|value| adjoints.get(value).copied().unwrap_or(zero)).collect();
+        let entries = second(g, factors, &weights);
+        for ((i, j), entry) in upper(arguments.len()).zip(entries) {
+            let [a, b] = [i, j].map(|k| tangents.get(&arguments[k]).unwrap_or(&none));
+            add_products(g, &mut hessian, entry, (a, b), i == j, n);
+        }
+    }
     for node in nodes {
-        if coordinates.seeds.contains_key(&node) {
+        let is_contracted = contractions.iter().any(|contraction| contraction.values.contains(&node));
+        if coordinates.seeds.contains_key(&node) || is_contracted {
             continue;
         }
         let Some(&weight) = adjoints.get(&node) else { continue };
@@ -92,16 +103,27 @@ pub(super) fn second_derivatives(
             let a = tangents.get(&local.operands[i]).unwrap_or(&none);
             let b = tangents.get(&local.operands[j]).unwrap_or(&none);
             let weight = g.sum_of_products(Some(weight), &products_of);
-            // Weights the shorter factor, which takes fewer products.
-            let (shorter, longer) = if a.len() <= b.len() { (a, b) } else { (b, a) };
-            let weighted: Sparse = shorter.iter().map(|&(c, part)| (c, g.mul(weight, part))).collect();
-            let terms = products(g, &weighted, longer, i == j, n);
-            for (place, term) in terms {
-                accumulate(g, &mut hessian, place, term);
-            }
+            add_products(g, &mut hessian, weight, (a, b), i == j, n);
         }
     }
     Some(hessian)
+}
+
+/// Adds weight · a aᵀ, or weight · (a bᵀ + b aᵀ).
+fn add_products(
+    g: &mut Graph,
+    hessian: &mut BTreeMap<usize, NodeId>,
+    weight: NodeId,
+    (a, b): (&Sparse, &Sparse),
+    same: bool,
+    n: usize,
+) {
+    // Weights the shorter factor, which takes fewer products.
+    let (shorter, longer) = if a.len() <= b.len() { (a, b) } else { (b, a) };
+    let weighted: Sparse = shorter.iter().map(|&(c, part)| (c, g.mul(weight, part))).collect();
+    for (place, term) in products(g, &weighted, longer, same, n) {
+        accumulate(g, hessian, place, term);
+    }
 }
 
 /// Returns ∇²output · w by second-order reverse accumulation: with each adjoint flows its derivative along w. The

@@ -116,7 +116,7 @@ fn linear_front(g: &Graph, output: NodeId, coordinates: &Coordinates) -> Option<
         }
     }
     let is_inner = front.iter().any(|node| !coordinates.seeds.contains_key(node));
-    (is_inner && front.len() > 1 && front.len() < coordinates.len()).then(|| front.into_iter().collect())
+    (is_inner && front.len() > 1 && front.len() <= coordinates.len()).then(|| front.into_iter().collect())
 }
 
 /// Returns the narrowest parts of the graph between the coordinates and U, of those that are closest to the coordinates:

@@ -2,9 +2,9 @@
 //! â = (w × a)/(‖a‖²‖b‖); that of â orthogonal to b̂ is q = â − c b̂ = (b × w)/(‖b‖²‖a‖). Neither subtracts nearly
 //! equal vectors when a and b align.
 
-use super::length::{Direction, assume_moderate, common_scale, direction, upper};
+use super::length::{Direction, assume_moderate, common_scale, direction};
 use super::{Function, Lowered, Shape};
-use crate::graph::{Form, Graph, NodeId, Op, Primitive, Product, Rule};
+use crate::graph::{Form, Graph, NodeId, Op, Primitive, Product, Rule, upper};
 use energy_runtime::Flag;
 
 pub(super) const FUNCTIONS: &[Function] = &[Function {

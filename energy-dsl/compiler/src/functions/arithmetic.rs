@@ -1,6 +1,7 @@
 //! Arithmetic operators on numbers, vectors and matrices.
 
 use super::inner_product::inner_product;
+use super::polar::recognise_stretch;
 use super::{Function, Lowered, Shape};
 use crate::graph::{Ending, Form, Graph, NodeId, Op, Origin};
 
@@ -130,7 +131,17 @@ fn sub(g: &mut Graph, args: &[Lowered]) -> Lowered {
     if matches!(g.origin(&args[1].parts), Some(Origin::Rotation { matrix }) if *matrix == args[0].parts) {
         g.note_origin(&difference.parts, Origin::Unrotated { matrix: args[0].parts.clone() });
     }
+    if let Some(Origin::Stretch { trace, matrix }) = g.origin(&args[0].parts).cloned()
+        && is_identity(g, &args[1])
+    {
+        g.note_origin(&difference.parts, Origin::Strain { trace, matrix });
+    }
     difference
+}
+
+fn is_identity(g: &Graph, a: &Lowered) -> bool {
+    let (rows, columns) = a.dimensions();
+    (0..rows).all(|i| (0..columns).all(|j| g.is(a.at(i, j), if i == j { 1.0 } else { 0.0 })))
 }
 
 /// Recognises x² − y² as (x − y)(x + y). One of the squares may be a constant with an exact root.
@@ -168,6 +179,9 @@ fn mul(g: &mut Graph, args: &[Lowered]) -> Lowered {
         (_, Shape::Scalar) => scaled(g, b.node(), a),
         (Shape::Quat | Shape::DualQuat, _) => super::quaternion::product(g, a, b),
         _ => {
+            if let Some(stretch) = recognise_stretch(g, a, b) {
+                return stretch;
+            }
             let ((rows, inner), (_, columns)) = (a.dimensions(), b.dimensions());
             let mut parts = Vec::with_capacity(rows * columns);
             for i in 0..rows {

@@ -7,9 +7,9 @@
 //! errors of the edges, so the angle of a nearly flat hinge has a small relative error.
 
 use super::angle::{accurate_cross, exact_cross};
-use super::length::{common_scale, direction_scaled, upper};
+use super::length::{common_scale, direction_scaled};
 use super::{Function, Lowered, Shape};
-use crate::graph::{DihedralParts, Form, Graph, NodeId, Primitive, Product, Rule};
+use crate::graph::{DihedralParts, Form, Graph, NodeId, Primitive, Product, Rule, upper};
 use energy_runtime::Flag;
 
 pub(super) const FUNCTIONS: &[Function] = &[Function {

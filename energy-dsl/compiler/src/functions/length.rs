@@ -5,7 +5,7 @@
 
 use super::inner_product::inner_product;
 use super::{Function, Lowered, Shape, parallelogram};
-use crate::graph::{Form, Graph, NodeId, Origin, Primitive, Rule};
+use crate::graph::{Form, Graph, NodeId, Origin, Primitive, Rule, upper};
 use energy_runtime::Flag;
 
 pub(super) const FUNCTIONS: &[Function] = &[
@@ -122,11 +122,6 @@ pub(super) fn projector(g: &mut Graph, n: &[NodeId], i: usize, j: usize) -> Node
     }
     let product = g.mul(n[i], n[j]);
     g.neg(product)
-}
-
-/// Returns all (i, j) with i ≤ j < n.
-pub(super) fn upper(n: usize) -> impl Iterator<Item = (usize, usize)> {
-    (0..n).flat_map(move |i| (i..n).map(move |j| (i, j)))
 }
 
 fn norm(g: &mut Graph, args: &[Lowered]) -> Lowered {

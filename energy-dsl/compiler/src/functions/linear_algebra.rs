@@ -3,6 +3,7 @@
 use super::angle::recognise_cosine;
 use super::arithmetic::scaled;
 use super::inner_product::inner_product;
+use super::polar::recognise_stretch_trace;
 use super::rotated::recognise_rotated_product;
 use super::spatial_polar::distance_to_rotation;
 use super::{Function, Lowered, Shape};
@@ -244,9 +245,12 @@ fn dot(g: &mut Graph, a: &[Lowered]) -> Lowered {
         (_, Shape::Scalar) => scaled(g, y.node(), x),
         _ => {
             if x.parts == y.parts
-                && let Some(Origin::Unrotated { matrix }) = g.origin(&x.parts).cloned()
+                && let Some(Origin::Unrotated { matrix } | Origin::Strain { matrix, .. }) = g.origin(&x.parts).cloned()
             {
                 return Lowered::scalar(distance_to_rotation(g, &matrix));
+            }
+            if let Some(trace) = recognise_stretch_trace(g, x, y).or_else(|| recognise_stretch_trace(g, y, x)) {
+                return trace;
             }
             let recognised = recognise_cosine(g, &x.parts, &y.parts);
             let recognised = recognised.or_else(|| recognise_rotated_product(g, &x.parts, &y.parts));
@@ -285,8 +289,13 @@ fn transpose(_: &mut Graph, a: &[Lowered]) -> Lowered {
 }
 
 fn trace(g: &mut Graph, a: &[Lowered]) -> Lowered {
-    if let Some(&Origin::Stretch { trace, .. }) = g.origin(&a[0].parts) {
-        return Lowered::scalar(trace);
+    match g.origin(&a[0].parts) {
+        Some(&Origin::Stretch { trace, .. }) => return Lowered::scalar(trace),
+        Some(&Origin::Strain { trace, .. }) => {
+            let three = g.constant(3.0);
+            return Lowered::scalar(g.sub(trace, three));
+        }
+        _ => {}
     }
     let n = a[0].dimensions().0;
     let diagonal: Vec<_> = (0..n).map(|i| a[0].at(i, i)).collect();

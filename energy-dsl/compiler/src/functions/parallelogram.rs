@@ -1,8 +1,7 @@
 //! ‖a × b‖, the area of the parallelogram of a and b. With r = ‖a × b‖ and n = (a × b)/r: ∂r/∂a = b × n, ∂r/∂b = n × a,
 //! ∂²r/∂a² = (b·b/r) n nᵀ, ∂²r/∂b² = (a·a/r) n nᵀ and ∂²r/∂aᵢ∂bⱼ = εᵢⱼₖ nₖ − (a·b/r) nᵢ nⱼ.
 
-use super::length::upper;
-use crate::graph::{Graph, NodeId, Origin, Product, symmetric_index};
+use crate::graph::{Graph, NodeId, Origin, Product, symmetric_index, upper};
 
 /// Returns a and b if `d` is their cross product and all their components are independent.
 pub(super) fn edges(g: &Graph, d: &[NodeId]) -> Option<[Vec<NodeId>; 2]> {

@@ -14,7 +14,8 @@ pub(super) const FUNCTIONS: &[Function] = &[
              1, and the singular values have the sign of det F on the smallest. Where two of them sum to 0, the result \
              is taken as 0 and flagged; for a 3×3 matrix also where the sum is below 400 roundoffs of the largest. \
              Elsewhere, errors are below 50 u κ with κ = σ₁/(σ₂ + σ₃). For a 3×2 matrix, R has orthonormal columns and \
-             S ≥ 0; the result is flagged where the columns are parallel.",
+             S ≥ 0; the result is flagged where the columns are parallel. For a 3×3 matrix, `transpose(R) * F` is S, \
+             `ddot(R, F)` is tr S, and `ddot(F - R, F - R)` is the squared distance to R.",
         shape: |shapes| deformation(shapes).map(|_| shapes[0]),
         lower: |g, a| rotation(g, &a[0]),
         accuracy: "",
@@ -91,6 +92,22 @@ fn stretch(g: &mut Graph, f: &Lowered) -> Lowered {
     let ([a, b], [r, s]) = (columns(f), orthonormal_columns(g, f));
     let (first, mixed, last) = (g.dot(&r.parts, &a.parts), g.dot(&r.parts, &b.parts), g.dot(&s.parts, &b.parts));
     Lowered::matrix(2, 2, vec![first, mixed, mixed, last])
+}
+
+/// Recognises the product RᵀF, which is S.
+pub(super) fn recognise_stretch(g: &mut Graph, a: &Lowered, f: &Lowered) -> Option<Lowered> {
+    if a.dimensions() != (3, 3) || f.dimensions() != (3, 3) {
+        return None;
+    }
+    let rotation: Vec<NodeId> = (0..9).map(|e| a.at(e % 3, e / 3)).collect();
+    let is_own = matches!(g.origin(&rotation), Some(Origin::Rotation { matrix }) if *matrix == f.parts);
+    is_own.then(|| spatial_stretch(g, f))
+}
+
+/// Recognises ⟨R, F⟩, which is tr S.
+pub(super) fn recognise_stretch_trace(g: &mut Graph, r: &Lowered, f: &Lowered) -> Option<Lowered> {
+    let is_own = matches!(g.origin(&r.parts), Some(Origin::Rotation { matrix }) if *matrix == f.parts);
+    is_own.then(|| Lowered::scalar(polar(g, f).trace))
 }
 
 /// Returns S = RᵀF of a 3×3 matrix, as the mean with its transpose.

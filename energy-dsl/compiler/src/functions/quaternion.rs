@@ -4,10 +4,10 @@
 //! and the dual part ½ t q; it takes p to q p q* + t. The exponential of a twist rotates by the angle 2‖θ‖: q = (cos
 //! ‖θ‖, θ sin ‖θ‖/‖θ‖).
 
-use super::length::{direction, upper};
+use super::length::direction;
 use super::sinc::{assume_at_most_a_quarter_turn, cos_sqrt, sinc_sqrt};
 use super::{Function, Lowered, Shape};
-use crate::graph::{Form, Graph, NodeId, Origin, Primitive, Rule};
+use crate::graph::{Form, Graph, NodeId, Origin, Primitive, Rule, upper};
 use energy_runtime::Flag;
 
 pub(super) const FUNCTIONS: &[Function] = &[

@@ -2,6 +2,7 @@
 //! Nodes are numbered in topological order: operands come before their uses.
 
 mod build;
+mod contraction;
 mod count;
 mod fuse;
 mod interpret;
@@ -17,12 +18,14 @@ mod spectrum;
 mod substitute;
 mod sums;
 
+pub(crate) use contraction::Contraction;
 pub use count::{count, reachable};
 pub use interpret::Interpreter;
 pub use node::{Input, NodeId, Op};
 pub use ordinary::{Assumption, general, ordinary};
 pub(crate) use origin::Origin;
 pub use recognise::{Ending, Expansion, Recogniser};
+pub(crate) use rule::upper;
 pub use rule::{DihedralParts, Primitive, Product, Rule, symmetric_index};
 pub use signs::with_signs_inside;
 pub(crate) use spectrum::{Dependence, Spectrum};
@@ -61,6 +64,8 @@ pub struct Graph {
     origins: FxHashMap<Vec<NodeId>, Origin>,
     /// Singular values, with the vectors that their derivatives need.
     spectra: Vec<Spectrum>,
+    /// Weighted sums of second derivatives that have closed forms.
+    contractions: Vec<Contraction>,
     /// Determinants of square matrices. That of a rest shape must be positive.
     determinants: Vec<NodeId>,
     /// Nodes that are rounded before every use; see `fuse.rs`.
@@ -103,6 +108,7 @@ impl Graph {
             assumptions: Vec::new(),
             origins: FxHashMap::default(),
             spectra: Vec::new(),
+            contractions: Vec::new(),
             determinants: Vec::new(),
             rounded: BTreeSet::new(),
             weighable: BTreeMap::new(),

@@ -19,6 +19,8 @@ pub(crate) enum Origin {
     Rotation { matrix: Vec<NodeId> },
     /// F − R of F = R S.
     Unrotated { matrix: Vec<NodeId> },
+    /// S − I of F = R S, with the trace of S.
+    Strain { trace: NodeId, matrix: Vec<NodeId> },
     /// FᵀF of a matrix F with these columns.
     Gram { columns: Vec<Vec<NodeId>> },
     /// The exponential of a twist (θ, t), with cos ‖θ‖ and sin ‖θ‖/‖θ‖.

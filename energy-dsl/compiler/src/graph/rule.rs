@@ -224,6 +224,11 @@ pub const fn symmetric_index(n: usize, i: usize, j: usize) -> usize {
     i * n - i * (i + 1) / 2 + j
 }
 
+/// Returns all (i, j) with i ≤ j < n.
+pub(crate) fn upper(n: usize) -> impl Iterator<Item = (usize, usize)> {
+    (0..n).flat_map(move |i| (i..n).map(move |j| (i, j)))
+}
+
 impl Graph {
     /// Adds a rule. `extra` distinguishes rules with equal primitives and arguments but different constants.
     pub(crate) fn add_rule(&mut self, rule: Rule, extra: &[NodeId]) -> NodeId {

@@ -8,6 +8,7 @@
 //! The condition number of R is κ = σ₁/(σ₂ + σ₃). Where it is small, `quartic.rs` finds R and T in few operations.
 //! Elsewhere, for needles and near mirror images, `singular_vectors.rs` does.
 
+mod contraction;
 mod matrix;
 mod newton;
 mod quartic;
@@ -15,8 +16,8 @@ mod singular_vectors;
 
 use super::Lowered;
 use super::inner_product::inner_product;
-use super::length::{common_scale, upper};
-use crate::graph::{Form, Graph, NodeId, Primitive, Rule, symmetric_index};
+use super::length::common_scale;
+use crate::graph::{Form, Graph, NodeId, Primitive, Rule, symmetric_index, upper};
 use matrix::{Inverse, Matrix, Vector, inverted, product, rows, symmetric, times, trace, transposed};
 use quartic::Quartic;
 
@@ -167,7 +168,11 @@ impl Decomposition {
             let rule = Rule::factored(primitive, arguments.to_vec(), value, first, second);
             g.add_rule(rule.without_limit(0, self.degenerate), &[])
         };
-        (0..9).map(rule).collect()
+        let values: Vec<NodeId> = (0..9).map(rule).collect();
+        if values.iter().all(|&value| g.rule(value).is_some()) {
+            g.note_contraction(contraction::of_rotation(self, arguments, values.clone()));
+        }
+        values
     }
 
     /// Returns E = S − I. Near rest it solves E (S + I) = FᵀF − I, whose right side keeps its digits.

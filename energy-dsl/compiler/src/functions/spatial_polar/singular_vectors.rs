@@ -10,7 +10,7 @@ use crate::functions::singular::Decomposition;
 use crate::graph::{Graph, NodeId};
 
 /// Steps of refinement. Each one multiplies the errors of R by about u κ.
-const STEPS: usize = 3;
+const STEPS: usize = 4;
 /// Larger corrections of R are errors of σ₂ + σ₃, which is nearly 0.
 const LARGEST_TURN: f64 = 0.125;
 /// Larger ratios of consecutive corrections are rounding.
