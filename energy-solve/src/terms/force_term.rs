@@ -56,7 +56,7 @@ impl<E: ForceLaw<f64> + Debug + Send> TermDescription for ForceTerm<E> {
         self.list.name()
     }
 
-    fn declaration(&self) -> &'static Declaration {
+    fn declaration(&self) -> &Declaration {
         E::DECLARATION
     }
 
@@ -129,7 +129,7 @@ impl<E: ForceLaw<f64> + Debug + Send + Sync> TermDescription for PlacedForceTerm
         self.term.name()
     }
 
-    fn declaration(&self) -> &'static Declaration {
+    fn declaration(&self) -> &Declaration {
         self.term.declaration()
     }
 

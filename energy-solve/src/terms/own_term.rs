@@ -44,7 +44,7 @@ pub struct OwnResults {
 /// A force or an energy of all elements of a term, as a function of the positions and velocities of their points.
 pub trait OwnLaw: Debug + Send + Sync {
     /// The declaration of one element.
-    fn declaration(&self) -> &'static Declaration;
+    fn declaration(&self) -> &Declaration;
     /// The number of vertices of one element.
     fn points(&self) -> usize {
         self.declaration().points.len()
@@ -91,7 +91,7 @@ impl<L: OwnLaw> TermDescription for OwnTerm<L> {
         &self.name
     }
 
-    fn declaration(&self) -> &'static Declaration {
+    fn declaration(&self) -> &Declaration {
         self.law.declaration()
     }
 
@@ -249,7 +249,7 @@ impl<L: OwnLaw> TermDescription for PlacedOwnTerm<L> {
         self.term.name()
     }
 
-    fn declaration(&self) -> &'static Declaration {
+    fn declaration(&self) -> &Declaration {
         self.term.declaration()
     }
 

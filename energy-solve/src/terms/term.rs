@@ -45,7 +45,7 @@ pub trait TermDescription: std::fmt::Debug + Send {
     /// The term's name, for people: "structural springs".
     fn name(&self) -> &str;
     /// The declaration of the term's elements.
-    fn declaration(&self) -> &'static Declaration;
+    fn declaration(&self) -> &Declaration;
     /// The properties of the term's force.
     fn character(&self) -> Character;
     /// The vertices of each element.

@@ -121,8 +121,8 @@ impl OwnForce for OwnText {
         let shared: SharedElements = Arc::new(Mutex::new(elements));
         handles.push(Handle::Whole(Arc::clone(&shared)));
         match declaration.kind {
-            Kind::Force => Box::new(OwnTerm::new(name, TextForce(shared), vertices)),
-            _ => Box::new(OwnTerm::new(name, TextResidual { elements: shared, points: self.points }, vertices)),
+            Kind::Force => Box::new(OwnTerm::new(name, TextForce::new(shared), vertices)),
+            _ => Box::new(OwnTerm::new(name, TextResidual::new(shared, self.points), vertices)),
         }
     }
 }
@@ -280,7 +280,7 @@ impl OwnForce for OwnFunction {
 }
 
 impl OwnLaw for OwnFunction {
-    fn declaration(&self) -> &'static Declaration {
+    fn declaration(&self) -> &Declaration {
         if self.is_energy { PythonEnergy::<f64>::DECLARATION } else { PythonForce::<f64>::DECLARATION }
     }
 

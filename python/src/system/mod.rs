@@ -119,7 +119,7 @@ impl System {
         let points = match declaration.kind {
             Kind::Residual if element.unknown_count().is_multiple_of(3) => element.unknown_count() / 3,
             Kind::Residual => {
-                let (name, found) = (declaration.name, element.unknown_count());
+                let (name, found) = (&declaration.name, element.unknown_count());
                 let message = format!("{name}: expected three unknowns for each vertex, got {found} unknowns");
                 return Err(PyTypeError::new_err(message));
             }

@@ -41,7 +41,7 @@ fn assert_same(entry: &AnyElement, element: &Interpreted, sample: &Sample) {
 }
 
 fn element(declaration: &Declaration) -> Interpreted {
-    Interpreted::from_source(declaration.source).expect("it compiles").pop().expect("it declares the element")
+    Interpreted::from_source(&declaration.source).expect("it compiles").pop().expect("it declares the element")
 }
 
 /// Ordinary inputs, inputs on a lattice, inputs with zeros, coincidences and extreme sizes, and sweeps to every

@@ -55,7 +55,7 @@ impl<L: DissipationLaw> TermDescription for DissipationTerm<L> {
         &self.on.name
     }
 
-    fn declaration(&self) -> &'static Declaration {
+    fn declaration(&self) -> &Declaration {
         <L::Element as Element>::DECLARATION
     }
 
@@ -142,7 +142,7 @@ impl<L: DissipationLaw> TermDescription for PlacedDissipationTerm<L> {
         self.term.name()
     }
 
-    fn declaration(&self) -> &'static Declaration {
+    fn declaration(&self) -> &Declaration {
         self.term.declaration()
     }
 
