@@ -40,7 +40,8 @@ pub(super) fn declaration(program: &Program, routines: &Routines) -> TokenStream
     let properties = borrowed(quote!(&[#(::energy_dsl::Property::#properties),*]));
     let [vectors, primitives, list] =
         [quote!(&[#(#vectors),*]), quote!(&[#(#primitives),*]), quote!(&[#(#list),*])].map(borrowed);
-    quote! {
+    quote! {{
+        use ::std::borrow::Cow::Borrowed;
         ::energy_dsl::Declaration {
             name: #name,
             kind: ::energy_dsl::Kind::#kind,
@@ -63,7 +64,7 @@ pub(super) fn declaration(program: &Program, routines: &Routines) -> TokenStream
             primitives: #primitives,
             routines: #list,
         }
-    }
+    }}
 }
 
 /// Properties that solvers rely on.
@@ -100,7 +101,7 @@ pub(crate) fn character(program: &Program, routines: &Routines) -> Character {
 
 /// Writes a constant that a description borrows.
 fn borrowed(constant: impl ToTokens) -> TokenStream {
-    quote!(::std::borrow::Cow::Borrowed(#constant))
+    quote!(Borrowed(#constant))
 }
 
 fn fields(inputs: &[Input]) -> TokenStream {
