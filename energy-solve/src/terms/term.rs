@@ -52,6 +52,30 @@ pub trait TermDescription: std::fmt::Debug + Send {
     fn stencils(&self) -> Stencils<'_>;
 }
 
+/// A placed term that keeps the term from which it was made. It has the same description.
+pub(crate) trait MadeFromTerm: std::fmt::Debug + Send {
+    /// Returns the term.
+    fn term(&self) -> &dyn TermDescription;
+}
+
+impl<P: MadeFromTerm> TermDescription for P {
+    fn name(&self) -> &str {
+        self.term().name()
+    }
+
+    fn declaration(&self) -> &Declaration {
+        self.term().declaration()
+    }
+
+    fn character(&self) -> Character {
+        self.term().character()
+    }
+
+    fn stencils(&self) -> Stencils<'_> {
+        self.term().stencils()
+    }
+}
+
 /// Elements of one type, to become part of a [`System`](crate::System).
 ///
 /// A term cannot be evaluated until [`Term::place`] turns it into a [`PlacedTerm`].

@@ -1,6 +1,6 @@
 //! Potentials whose elements change between steps, within a system.
 
-use energy_dsl::{Declaration, Vector3};
+use energy_dsl::Vector3;
 
 use super::evaluated::Evaluated;
 use super::placed::PlacedPotentialTerm;
@@ -13,8 +13,7 @@ use crate::terms::places::BlockPlaces;
 use crate::terms::restriction::Restriction;
 use crate::terms::share::{Divisible, Share};
 use crate::terms::state::{State, StepStart};
-use crate::terms::stencils::Stencils;
-use crate::terms::term::{Character, PlacedTerm, Quantity, TermDescription};
+use crate::terms::term::{MadeFromTerm, PlacedTerm, Quantity, TermDescription};
 
 /// A term whose elements are packed again when they change. They stay fixed during a step.
 pub(super) trait Changing: TermDescription + Sync + 'static {
@@ -69,21 +68,9 @@ impl<T: Changing> PlacedChangingTerm<T> {
     }
 }
 
-impl<T: Changing> TermDescription for PlacedChangingTerm<T> {
-    fn name(&self) -> &str {
-        self.term.name()
-    }
-
-    fn declaration(&self) -> &Declaration {
-        self.term.declaration()
-    }
-
-    fn character(&self) -> Character {
-        self.term.character()
-    }
-
-    fn stencils(&self) -> Stencils<'_> {
-        self.term.stencils()
+impl<T: Changing> MadeFromTerm for PlacedChangingTerm<T> {
+    fn term(&self) -> &dyn TermDescription {
+        &self.term
     }
 }
 
