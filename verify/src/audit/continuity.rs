@@ -38,7 +38,7 @@ impl Auditor<'_> {
     fn destinations(&self, case: &Case<'_>, other: &Sample) -> Vec<Sample> {
         let positions = &case.sample.positions;
         let mut ends = vec![other.positions.clone()];
-        if has_points(&self.declaration) {
+        if has_points(self.declaration) {
             ends.push(case.turned(positions));
         }
         if self.subject.formula.program().audit_scope.ranges.is_empty() {

@@ -21,7 +21,7 @@ const OUT_OF_DOMAIN: &str =
 impl Auditor<'_> {
     /// Checks every law at one input.
     pub(super) fn laws(&mut self, case: &Case<'_>, answer: &Answer) -> Result<(), NoAnswer> {
-        let has_points = has_points(&self.declaration);
+        let has_points = has_points(self.declaration);
         self.finite(&case.sample, answer);
         self.repeats(&case.sample, answer);
         self.symmetry(&case.sample, answer);

@@ -140,7 +140,7 @@ impl Auditor<'_> {
         });
         let line = &mut accuracy[at];
         line.inputs += 1;
-        let entry = || entry_name(&self.declaration, block, truth.worst_entry(&block.numbers));
+        let entry = || entry_name(self.declaration, block, truth.worst_entry(&block.numbers));
         if line.input.is_none() || error > line.worst || error.is_nan() {
             (line.worst, line.entry, line.input) = (error, entry(), Some(case.sample.clone()));
         }
