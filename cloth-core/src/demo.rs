@@ -29,7 +29,7 @@ pub struct AuditError(String);
 /// # Errors
 /// Returns an error if a check fails, with the element, the entry and both values.
 pub fn audit_materials(simulation: &Simulation) -> Result<String, AuditError> {
-    let mut elements: Vec<&str> = simulation.terms().map(|term| term.declaration().name).collect();
+    let mut elements: Vec<&str> = simulation.terms().map(|term| &*term.declaration().name).collect();
     elements.sort_unstable();
     elements.dedup();
     let options = Options::default();

@@ -154,7 +154,7 @@ impl TermDescription for Unrestrictable {
         "nothing"
     }
 
-    fn declaration(&self) -> &'static Declaration {
+    fn declaration(&self) -> &Declaration {
         <Gravity as Element>::DECLARATION
     }
 

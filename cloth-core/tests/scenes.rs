@@ -347,7 +347,7 @@ fn the_scenes_of_the_gallery_are_valid() {
             assert!(entries.iter().any(|entry| gallery.contains(entry)), "{name} is not in docs/scenes.md");
             assert!(simulation.warnings().is_empty(), "{}: {:?}", path.display(), simulation.warnings());
             for term in simulation.terms() {
-                let name = term.declaration().name;
+                let name = &term.declaration().name;
                 assert!(element(name).is_some(), "{}: `{name}` is not in `materials::ELEMENTS`", path.display());
             }
             count += 1;

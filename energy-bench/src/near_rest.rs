@@ -78,7 +78,7 @@ impl NearRest {
 
 /// The gradient to 30 digits.
 fn true_gradient<K: Subject>(sample: &Sample) -> TrueBlock {
-    let formula = Textbook::from_source(K::DECLARATION.source).expect("the declaration compiles");
+    let formula = Textbook::from_source(&K::DECLARATION.source).expect("the declaration compiles");
     let constants = sample.textbook.len() - sample.unknowns.len();
     let input = verify::Sample {
         parameters: sample.textbook[..constants].to_vec(),

@@ -79,7 +79,7 @@ pub trait Subject: Debug + 'static {
     /// Returns the operation count of the generated routine.
     #[must_use]
     fn operations() -> OperationCount {
-        let routines = Self::DECLARATION.routines;
+        let routines = &Self::DECLARATION.routines;
         routines.iter().find(|routine| routine.name == Self::ROUTINE).map_or_else(Default::default, |r| r.full)
     }
 }

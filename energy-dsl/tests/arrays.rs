@@ -49,9 +49,9 @@ fn arrays_of_points_and_parameters_are_indexed_and_summed() {
     assert_relative_eq!(at.value, 4.0 * d.iter().map(|d| d * d).sum::<f64>() + linear, max_relative = 1e-14);
     assert_relative_eq!(at.gradient[2][1], 8.0 * 0.3 * d[1], max_relative = 1e-14);
     assert_relative_eq!(at.gradient[3][0], 8.0 * 0.4 * d[0] + 22.0, max_relative = 1e-14);
-    let names: Vec<_> = Centre::<f64>::DECLARATION.points.iter().map(|p| (p.name, p.size)).collect();
+    let names: Vec<_> = Centre::<f64>::DECLARATION.points.iter().map(|p| (&*p.name, p.size)).collect();
     assert_eq!(names, [("x[0]", 3), ("x[1]", 3), ("x[2]", 3), ("x[3]", 3)]);
-    let sizes: Vec<_> = Centre::<f64>::DECLARATION.parameters.iter().map(|p| (p.name, p.size)).collect();
+    let sizes: Vec<_> = Centre::<f64>::DECLARATION.parameters.iter().map(|p| (&*p.name, p.size)).collect();
     assert_eq!(sizes, [("w", 4), ("c", 6), ("M", 6), ("k", 1)]);
 }
 
@@ -62,7 +62,7 @@ fn flat_parameters_and_the_source_text_mean_the_same() {
     let inputs = Inputs { parameters: &parameters, rest: &[], positions: &positions, velocities: &[] };
     let generated = Centre::<f64>::evaluate(&inputs).unwrap().blocks[0].1[0];
     // The text includes the function and the constant that it uses.
-    let source = Centre::<f64>::DECLARATION.source;
+    let source = &Centre::<f64>::DECLARATION.source;
     assert!(source.contains("fn blend") && source.contains("const COUNT"), "{source}");
     assert_relative_eq!(generated, Textbook::from_source(source).unwrap().evaluate(&inputs)[0], max_relative = 1e-14);
 }

@@ -48,14 +48,14 @@ fn fixed_parameters_are_no_fields() {
     assert_eq!(Unit::<f64>::new().value(&X).value, 25.0);
     assert_eq!(Switched::new(2.0).value(&X).value, 50.0);
     assert_eq!(Taut::new(2.0, 1.0, 0.0).constraint_jacobian(&X).value, [9.0]);
-    let names: Vec<_> = Taut::<f64>::DECLARATION.parameters.iter().map(|p| p.name).collect();
+    let names: Vec<_> = Taut::<f64>::DECLARATION.parameters.iter().map(|p| &*p.name).collect();
     assert_eq!(names, ["s"]);
     assert!(First::<f64>::DECLARATION.docs.contains("b = NONE"));
 }
 
 #[test]
 fn the_text_of_a_specialised_declaration_stands_alone() {
-    let textbook = Textbook::from_source(Unit::<f64>::DECLARATION.source).unwrap();
+    let textbook = Textbook::from_source(&Unit::<f64>::DECLARATION.source).unwrap();
     let positions = X.concat();
     let inputs = Inputs { parameters: &[], rest: &[], positions: &positions, velocities: &[] };
     assert_eq!(textbook.evaluate(&inputs), [25.0]);

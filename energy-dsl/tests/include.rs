@@ -16,7 +16,7 @@ fn a_file_declares_what_a_macro_would() {
 
 #[test]
 fn the_text_that_a_type_carries_stands_alone() {
-    let source = Reference::<f64>::DECLARATION.source;
+    let source = &Reference::<f64>::DECLARATION.source;
     assert!(source.starts_with("const REFERENCE"), "{source}");
     assert_eq!(Hinge::<f64>::DECLARATION.formula, "\\hat{a}·b̂ − cos θ₀");
     assert_eq!(Spring::<f64>::DECLARATION.docs, "A spring of rest length L.");

@@ -143,7 +143,7 @@ fn a_rest_shape_is_read_once_and_refused_when_degenerate() {
 
 #[test]
 fn the_source_a_type_carries_means_what_the_type_computes() {
-    let textbook = Textbook::from_source(<Stretch as Element>::DECLARATION.source).unwrap();
+    let textbook = Textbook::from_source(&<Stretch as Element>::DECLARATION.source).unwrap();
     let rest = [0.0, 0.0, 0.0, 0.0, 2.0, 0.0];
     let positions = [P, Q].concat();
     let inputs = Inputs { parameters: &[4.0], rest: &rest, positions: &positions, velocities: &[] };

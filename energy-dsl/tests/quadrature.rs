@@ -124,7 +124,7 @@ fn a_flag_of_one_term_is_a_flag_of_the_sum() {
 /// The brick as text runs the same loop over its tape: ordinary, with an inverted corner, and where the sum overflows.
 #[test]
 fn a_tape_runs_the_loop_with_the_same_bits() {
-    let read = Interpreted::from_source(<Brick as Element>::DECLARATION.source).unwrap().pop().unwrap();
+    let read = Interpreted::from_source(&<Brick as Element>::DECLARATION.source).unwrap().pop().unwrap();
     let (rest, x) = shapes();
     let mut inverted = x;
     inverted[6] = [-1.5, -1.5, -1.5];

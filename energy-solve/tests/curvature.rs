@@ -30,7 +30,7 @@ pub(crate) struct Read(Interpreted);
 
 impl Read {
     pub(crate) fn new<E: Element>() -> Self {
-        Self(Interpreted::from_source(E::DECLARATION.source).unwrap().pop().unwrap())
+        Self(Interpreted::from_source(&E::DECLARATION.source).unwrap().pop().unwrap())
     }
 
     /// Returns a term of equal elements, each with its own points.

@@ -36,7 +36,7 @@ fn compiled() -> Box<dyn Term> {
 }
 
 fn read() -> Box<dyn Term> {
-    let element = Interpreted::from_source(NeoHooke::<f64>::DECLARATION.source).unwrap().remove(0);
+    let element = Interpreted::from_source(&NeoHooke::<f64>::DECLARATION.source).unwrap().remove(0);
     let elements = element.elements::<f64>(2, &[], &[Column::Same(&[3.0])]).unwrap();
     let vertices = STENCILS.into_iter().flatten();
     Box::new(TapeTerm::new("membranes".into(), element.declaration(), elements.tape().clone(), vertices))

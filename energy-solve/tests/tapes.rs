@@ -28,7 +28,7 @@ impl<E: PackedPotential<f64> + Element + std::fmt::Debug + Send + Sync + 'static
     }
 
     fn read(self) -> Box<dyn Term> {
-        let element = Interpreted::from_source(E::DECLARATION.source).unwrap().pop().unwrap();
+        let element = Interpreted::from_source(&E::DECLARATION.source).unwrap().pop().unwrap();
         let [rest, parameters] = [&self.rest, &self.parameters]
             .map(|list| list.iter().map(|numbers| Column::Each(numbers)).collect::<Vec<_>>());
         let elements = element.elements(self.elements.len(), &rest, &parameters).unwrap();

@@ -105,7 +105,7 @@ pub fn energies(py: Python<'_>, text: &str, file: &str) -> PyResult<Vec<Element>
 /// Returns the names of the elements of the library, in alphabetical order.
 #[pyfunction]
 pub fn catalogue() -> Vec<&'static str> {
-    energy_elements::DECLARATIONS.iter().map(|declaration| declaration.name).collect()
+    energy_elements::DECLARATIONS.iter().map(|declaration| &*declaration.name).collect()
 }
 
 /// Returns an element of the library; `None` if it has no such element. Its energies, forces and residuals run as
@@ -116,7 +116,7 @@ pub fn library_element(py: Python<'_>, name: &str) -> PyResult<Option<Element>> 
         return Ok(None);
     };
     let mut elements = py
-        .detach(|| Interpreted::from_source(declaration.source).map_err(|errors| errors.to_string()))
+        .detach(|| Interpreted::from_source(&declaration.source).map_err(|errors| errors.to_string()))
         .map_err(wrong)?;
     Ok(elements.pop().map(|inner| Element::new(inner, Origin::Library)))
 }
@@ -124,8 +124,8 @@ pub fn library_element(py: Python<'_>, name: &str) -> PyResult<Option<Element>> 
 #[pymethods]
 impl Element {
     #[getter]
-    fn name(&self) -> &'static str {
-        self.inner.declaration().name
+    fn name(&self) -> &str {
+        &self.inner.declaration().name
     }
 
     /// `energy`, `force`, `constraint` or `residual`.
@@ -135,14 +135,14 @@ impl Element {
     }
 
     #[getter]
-    fn formula(&self) -> &'static str {
-        self.inner.declaration().formula
+    fn formula(&self) -> &str {
+        &self.inner.declaration().formula
     }
 
     /// The text of the declaration.
     #[getter]
-    fn source(&self) -> &'static str {
-        self.inner.declaration().source
+    fn source(&self) -> &str {
+        &self.inner.declaration().source
     }
 
     /// Description, formula, shapes and units.

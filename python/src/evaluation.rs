@@ -143,7 +143,7 @@ struct Part<S> {
 impl<S: Precision> Batch<S> {
     /// Elements of the library are compiled code where it exists for the routine, else tapes.
     pub fn new(tapes: Tapes<S>, is_of_library: bool, threads: usize) -> Self {
-        let (sizes, name) = (Sizes::of(tapes.element(), tapes.len()), tapes.element().declaration().name);
+        let (sizes, name) = (Sizes::of(tapes.element(), tapes.len()), tapes.element().declaration().name.as_ref());
         // Tapes run over whole blocks.
         let size = tapes.len().div_ceil(TAPE_BLOCK).div_ceil(threads).max(1) * TAPE_BLOCK;
         let starts = (0..tapes.len().max(1)).step_by(size);

@@ -242,3 +242,20 @@ if __name__ == "__main__":
     both = [ed.energy(text).bind(5, k=2, L=1), ed.element("HookeSpring").bind(5, K=2, L=1)]
     test_calls_do_not_leak(both, 100_000)
     print("100,000 calls: no leak")
+
+
+@pytest.mark.skipif(not os.path.exists("/proc/self/statm"), reason="the system does not tell the memory of a process")
+def test_texts_leave_no_memory_behind():
+    def resident():
+        with open("/proc/self/statm") as file:
+            return int(file.read().split()[1]) * os.sysconf("SC_PAGE_SIZE")
+
+    def compile_texts(numbers):
+        for number in numbers:
+            text = f"/// {'x' * 10_000}\nenergy E{number}(p: Point; k{number}: Scalar) {{ k{number} * p.z }}"
+            ed.energy(text).bind(1, **{f"k{number}": 1.0}).value(np.zeros((1, 1, 3)))
+
+    compile_texts(range(100))
+    before = resident()
+    compile_texts(range(100, 500))
+    assert resident() - before < 400 * 10_000 / 2

@@ -134,3 +134,10 @@ def test_messages_say_what_was_expected():
         system.linearise(x, "soft")
     with pytest.raises(ValueError, match="no vertex 7"):
         ed.System(4, pinned=[7])
+
+
+def test_systems_of_any_size_are_refused_or_work():
+    with pytest.raises(ValueError, match="vertices: expected at most 4294967295, got 1099511627776"):
+        ed.System(2**40)
+    energy = ed.System(0).energy(np.zeros((0, 3)))
+    assert energy == 0 and not np.signbit(energy)

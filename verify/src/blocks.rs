@@ -162,7 +162,7 @@ pub enum NoAnswer {
     #[error("{element}: the block `{block}` is missing from the outputs of this {kind}")]
     Missing {
         /// Name of the element.
-        element: &'static str,
+        element: String,
         /// Name of the missing block.
         block: BlockName,
         /// Kind of the element.
@@ -172,7 +172,7 @@ pub enum NoAnswer {
     #[error("{element}: the block `{block}` holds {found} numbers, expected {expected}")]
     Length {
         /// Name of the element.
-        element: &'static str,
+        element: String,
         /// Name of the block.
         block: BlockName,
         /// Expected length.
@@ -187,22 +187,29 @@ pub enum NoAnswer {
 /// # Errors
 /// If the rest shape is degenerate, or a block is missing or has the wrong length.
 pub fn evaluate(
-    declaration: &'static Declaration,
+    declaration: &Declaration,
     evaluate: impl Fn(&Inputs<'_, f64>) -> Result<Outputs<f64>, RestError>,
     inputs: &Inputs<'_, f64>,
 ) -> Result<Answer, NoAnswer> {
     let mut outputs = evaluate(inputs)?;
-    let element = declaration.name;
+    let element = || declaration.name.to_string();
     let mut blocks = Vec::new();
     for &name in BlockName::of_kind(declaration.kind) {
         let (rows, columns) = shape(declaration, name);
         let at = outputs.blocks.iter().position(|(found, _)| *found == name.name());
         let numbers = match at {
             Some(at) => outputs.blocks.swap_remove(at).1,
-            None => return Err(NoAnswer::Missing { element, block: name, kind: declaration.kind.keyword() }),
+            None => {
+                return Err(NoAnswer::Missing { element: element(), block: name, kind: declaration.kind.keyword() });
+            }
         };
         if numbers.len() != rows * columns {
-            return Err(NoAnswer::Length { element, block: name, expected: rows * columns, found: numbers.len() });
+            return Err(NoAnswer::Length {
+                element: element(),
+                block: name,
+                expected: rows * columns,
+                found: numbers.len(),
+            });
         }
         blocks.push(Block::new(name, columns, numbers));
     }

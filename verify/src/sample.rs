@@ -45,7 +45,7 @@ impl Sample {
     pub fn fits(&self, declaration: &Declaration) -> Result<(), String> {
         let size = |fields: &[Field]| fields.iter().map(|field| field.size).sum::<usize>();
         let implied = if declaration.kind == Kind::Constraint { 2 } else { 0 };
-        let moving = size(declaration.points);
+        let moving = size(&declaration.points);
         let velocities = matches!(declaration.kind, Kind::Force | Kind::Constraint);
         let check = |what: &str, list: &[f64], expected: usize| {
             if list.len() != expected {
@@ -56,8 +56,8 @@ impl Sample {
         };
         check("positions", &self.positions, moving)?;
         check("velocities", &self.velocities, if velocities { moving } else { 0 })?;
-        check("rest", &self.rest, size(declaration.rest))?;
-        check("parameters", &self.parameters, size(declaration.parameters) + implied)
+        check("rest", &self.rest, size(&declaration.rest))?;
+        check("parameters", &self.parameters, size(&declaration.parameters) + implied)
     }
 
     /// Returns k_s and k_d, the last two parameters of a constraint.
@@ -86,16 +86,16 @@ impl Sample {
             }
         };
         let named =
-            |fields: &[Field]| fields.iter().map(|field| (field.name.to_owned(), field.size)).collect::<Vec<_>>();
-        let mut parameters = named(declaration.parameters);
+            |fields: &[Field]| fields.iter().map(|field| (field.name.to_string(), field.size)).collect::<Vec<_>>();
+        let mut parameters = named(&declaration.parameters);
         if declaration.kind == Kind::Constraint {
             parameters.extend([("(stiffness k_s)".to_owned(), 1), ("(damping k_d)".to_owned(), 1)]);
         }
-        add("", &named(declaration.points), &self.positions);
+        add("", &named(&declaration.points), &self.positions);
         if !self.velocities.is_empty() {
-            add("velocity of ", &named(declaration.points), &self.velocities);
+            add("velocity of ", &named(&declaration.points), &self.velocities);
         }
-        add("rest ", &named(declaration.rest), &self.rest);
+        add("rest ", &named(&declaration.rest), &self.rest);
         add("parameter ", &parameters, &self.parameters);
         text
     }
@@ -128,20 +128,20 @@ fn has_rest_points(declaration: &Declaration) -> bool {
 }
 
 /// Draws samples for one declaration.
-pub struct Sampler {
-    declaration: &'static Declaration,
+pub struct Sampler<'a> {
+    declaration: &'a Declaration,
     scope: AuditScope,
     random: Rng,
 }
 
-impl Sampler {
+impl<'a> Sampler<'a> {
     /// Creates a sampler whose samples depend on the seed and the declaration's name only.
-    pub fn new(declaration: &'static Declaration, seed: u64) -> Self {
+    pub fn new(declaration: &'a Declaration, seed: u64) -> Self {
         Self::within(&AuditScope::default(), declaration, seed)
     }
 
     /// Creates a sampler of the domain that a declaration states.
-    pub fn within(scope: &AuditScope, declaration: &'static Declaration, seed: u64) -> Self {
+    pub fn within(scope: &AuditScope, declaration: &'a Declaration, seed: u64) -> Self {
         // FNV-1a.
         let name = declaration
             .name
@@ -180,8 +180,8 @@ impl Sampler {
         // Lengths are about the size of the configuration, so that springs are compressed and stretched, and barriers
         // near and far.
         let length = if has_points(declaration) { shortest_distance(&positions).unwrap_or(1.0) } else { 1.0 };
-        for parameter in declaration.parameters {
-            let is_stated = self.scope.range(parameter.name).is_some();
+        for parameter in &*declaration.parameters {
+            let is_stated = self.scope.range(&parameter.name).is_some();
             let scale = if parameter.unit == "m" && !is_stated { length } else { 1.0 };
             parameters.extend(self.parameter(parameter).into_iter().map(|x| scale * x));
         }
@@ -298,7 +298,7 @@ impl Sampler {
     }
 
     fn unknown(&mut self, unknown: &Field) -> Vec<f64> {
-        match self.scope.range(unknown.name) {
+        match self.scope.range(&unknown.name) {
             Some((low, high)) => self.uniforms(unknown.size, low, high),
             None => self.unknowns(unknown.size),
         }
@@ -319,7 +319,7 @@ impl Sampler {
     /// Draws a rest shape: points in the plane or in space (a triangle or tetrahedron has positive size), or plain
     /// numbers.
     fn rest(&mut self) -> Vec<f64> {
-        let fields = self.declaration.rest;
+        let fields = &*self.declaration.rest;
         let count = fields.iter().map(|field| field.size).sum();
         let dimension = fields.first().map_or(0, |field| field.size);
         if !(2..=3).contains(&dimension) || fields.iter().any(|field| field.size != dimension) {
@@ -345,10 +345,10 @@ impl Sampler {
 
     /// Draws angles in (−2, 2), other scalars in [0.5, 2), and vectors of either sign.
     fn parameter(&mut self, field: &Field) -> Vec<f64> {
-        if let Some((low, high)) = self.scope.range(field.name) {
+        if let Some((low, high)) = self.scope.range(&field.name) {
             return self.uniforms(field.size, low, high);
         }
-        match (field.unit, field.size) {
+        match (&*field.unit, field.size) {
             ("rad", size) => self.uniforms(size, -2.0, 2.0),
             (_, 1) => self.uniforms(1, 0.5, 2.0),
             (_, size) => self.uniforms(size, -2.0, 2.0),

@@ -147,7 +147,7 @@ fn check<E: Potential<f64, Points = [[f64; 3]; 1]>>(
 ) where
     E::Triangle: AsRef<[[[f64; 3]; 3]]>,
 {
-    let name = E::DECLARATION.name;
+    let name = &E::DECLARATION.name;
     let mut worst = [0.0_f64; 3];
     for &x in arguments {
         let at = element.hessian(&[[x, 0.0, 0.0]]);

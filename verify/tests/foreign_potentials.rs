@@ -44,26 +44,26 @@ fn potentials() -> Vec<Potential> {
     let [seed] = numbers("POTENTIAL_SEED", [1]);
     let elements = Interpreted::from_source(POTENTIALS).unwrap_or_else(|errors| panic!("{errors}"));
     let with_textbook = |(number, element): (usize, Interpreted)| {
-        let textbook = Textbook::from_source(element.declaration().source).expect("it compiled before");
+        let textbook = Textbook::from_source(&element.declaration().source).expect("it compiled before");
         Potential { element, textbook, random: Rng::with_seed((1000 * seed + number) as u64) }
     };
     elements.into_iter().enumerate().map(with_textbook).collect()
 }
 
 impl Potential {
-    fn declaration(&self) -> &'static Declaration {
+    fn declaration(&self) -> &Declaration {
         self.element.declaration()
     }
 
     fn accuracy(&self) -> f64 {
-        let name = self.declaration().name;
+        let name = &self.declaration().name;
         CANCELLING.iter().find(|(other, _)| *other == name).map_or(ACCURACY, |(_, accuracy)| *accuracy)
     }
 
     /// Returns random parameters and a triangle at rest, with positions.
     fn sample(&mut self, positions: Vec<f64>) -> Sample {
         let count = |fields: &[Field]| fields.iter().map(|field| field.size).sum::<usize>();
-        let parameters = (0..count(self.declaration().parameters)).map(|_| 0.5 + self.random.f64()).collect();
+        let parameters = (0..count(&self.declaration().parameters)).map(|_| 0.5 + self.random.f64()).collect();
         let rest = if self.declaration().rest.is_empty() { vec![] } else { vec![0.0, 0.0, 1.0, 0.0, 0.0, 1.0] };
         Sample { parameters, rest, positions, velocities: vec![] }
     }
@@ -228,7 +228,7 @@ fn singular_inputs_give_limits_or_flags() {
     for mut potential in potentials() {
         for _ in 0..count {
             let sample = potential.singular();
-            times.push((potential.check_singular(&sample, &mut seen), potential.declaration().name));
+            times.push((potential.check_singular(&sample, &mut seen), potential.declaration().name.clone()));
         }
     }
     times.sort_by(|a, b| b.0.total_cmp(&a.0));

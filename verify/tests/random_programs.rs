@@ -101,8 +101,8 @@ fn expected(textbook: &Textbook, parameters: &[f64], x: &[f64]) -> [Vec<f64>; 3]
 /// Computes the same blocks in multi-precision, to 30 digits; `None` if the formula divides by zero.
 fn true_blocks(source: &str, textbook: &Textbook, parameters: &[f64], x: &[f64]) -> Option<[Vec<f64>; 3]> {
     let sample = Sample { parameters: parameters.into(), rest: vec![], positions: x.into(), velocities: vec![] };
-    let declaration = Interpreted::from_source(source).ok()?.first()?.declaration();
-    let blocks = multiprecision::truth(declaration, textbook, &sample, 30);
+    let element = Interpreted::from_source(source).ok()?.swap_remove(0);
+    let blocks = multiprecision::truth(element.declaration(), textbook, &sample, 30);
     let numbers = |k: usize| blocks[k].block.numbers.iter().map(multiprecision::Big::to_f64).collect::<Vec<f64>>();
     let [value, gradient, hessian] = [numbers(0), numbers(1), numbers(2)];
     let mut triangle = Vec::with_capacity(54);

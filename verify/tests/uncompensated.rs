@@ -74,7 +74,7 @@ fn the_attribute_is_part_of_the_source() {
     let spring =
         Interpreted::from_source(&format!("#[uncompensated] {SPRING} energy Stiff = Spring(k = 100);")).unwrap();
     for element in &spring {
-        let source = element.declaration().source;
+        let source = &element.declaration().source;
         let again = Interpreted::from_source(source).unwrap();
         assert_eq!(again[0].declaration().routines, element.declaration().routines, "{source}");
     }

@@ -78,11 +78,11 @@ pub fn describe(declaration: &Declaration) -> String {
         }
     };
     row(&mut text, "", &first_paragraph.split_whitespace().collect::<Vec<_>>().join(" "));
-    row(&mut text, "formula", declaration.formula);
-    row(&mut text, "points", &names(declaration.points));
-    row(&mut text, "rest", &names(declaration.rest));
-    row(&mut text, "parameters", &names(declaration.parameters));
-    for routine in declaration.routines {
+    row(&mut text, "formula", &declaration.formula);
+    row(&mut text, "points", &names(&declaration.points));
+    row(&mut text, "rest", &names(&declaration.rest));
+    row(&mut text, "parameters", &names(&declaration.parameters));
+    for routine in &*declaration.routines {
         let value = format!("{:<10} {}", routine.name, operations(&routine.full, &routine.reduced));
         row(&mut text, "operations", &value);
     }
@@ -105,7 +105,7 @@ fn operations(full: &OperationCount, reduced: &OperationCount) -> String {
 
 fn names(fields: &[Field]) -> String {
     let one = |field: &Field| {
-        if field.unit.is_empty() { field.name.to_owned() } else { format!("{} [{}]", field.name, field.unit) }
+        if field.unit.is_empty() { field.name.to_string() } else { format!("{} [{}]", field.name, field.unit) }
     };
     fields.iter().map(one).collect::<Vec<_>>().join(", ")
 }

@@ -56,7 +56,7 @@ impl Grip {
 
     /// Label of the grip's terms.
     pub(super) fn label() -> TermLabel {
-        TermLabel { name: NAME.to_owned(), element: <ZeroLengthSpring as Element>::DECLARATION.name }
+        TermLabel { name: NAME.to_owned(), element: <ZeroLengthSpring as Element>::DECLARATION.name.to_string() }
     }
 
     /// Adds the grip to the terms of an island.
@@ -101,7 +101,7 @@ impl TermDescription for GripTerm {
         NAME
     }
 
-    fn declaration(&self) -> &'static Declaration {
+    fn declaration(&self) -> &Declaration {
         <ZeroLengthSpring as Element>::DECLARATION
     }
 

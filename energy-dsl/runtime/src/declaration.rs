@@ -1,3 +1,5 @@
+use std::borrow::Cow;
+
 /// The kind of a declaration.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Kind {
@@ -51,14 +53,14 @@ impl Property {
 }
 
 /// A named input.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Field {
     /// Name, as declared.
-    pub name: &'static str,
+    pub name: Cow<'static, str>,
     /// Number of scalars.
     pub size: usize,
     /// Unit, as declared; empty if none was given.
-    pub unit: &'static str,
+    pub unit: Cow<'static, str>,
 }
 
 /// Operation counts of one routine, after simplification.
@@ -122,29 +124,33 @@ pub struct Routine {
     pub full: OperationCount,
 }
 
-/// Self-description of a generated element.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// Points of a sum, with their signs: `true` if the point is added, `false` if it is subtracted.
+pub type SignedPoints = Cow<'static, [(usize, bool)]>;
+
+/// Self-description of an element. Generated code borrows its texts and lists; elements that are read at run time own
+/// them.
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Declaration {
     /// Name of the generated type.
-    pub name: &'static str,
+    pub name: Cow<'static, str>,
     /// Kind of the declaration.
     pub kind: Kind,
     /// Doc comment of the declaration.
-    pub docs: &'static str,
+    pub docs: Cow<'static, str>,
     /// Body as written, on one line.
-    pub formula: &'static str,
+    pub formula: Cow<'static, str>,
     /// Source of the declaration with everything it uses. It parses to the same program.
-    pub source: &'static str,
+    pub source: Cow<'static, str>,
     /// Points, or the unknowns of a residual.
-    pub points: &'static [Field],
+    pub points: Cow<'static, [Field]>,
     /// Inputs of the rest shape.
-    pub rest: &'static [Field],
+    pub rest: Cow<'static, [Field]>,
     /// Parameters, without the stiffness and damping that every constraint has.
-    pub parameters: &'static [Field],
+    pub parameters: Cow<'static, [Field]>,
     /// Number of rows: 1 for an energy, the length of C or r, three per point for a force.
     pub rows: usize,
     /// Claimed properties.
-    pub properties: &'static [Property],
+    pub properties: Cow<'static, [Property]>,
     /// Whether points enter only as differences. Proved on the expression graph, as are the next four fields and
     /// `dihedral`.
     pub translation_invariant: bool,
@@ -160,15 +166,14 @@ pub struct Declaration {
     pub symmetric: bool,
     /// Number of reduced coordinates.
     pub reduced_coordinates: usize,
-    /// Points of each difference vector in the reduced coordinates, with their signs (`true`: added). Empty for
-    /// residuals.
-    pub reduced_vectors: &'static [&'static [(usize, bool)]],
+    /// Each difference vector in the reduced coordinates. Empty for residuals.
+    pub reduced_vectors: Cow<'static, [SignedPoints]>,
     /// Points x₁, x₂, x₃ and x₄ if the energy depends on points only through the dihedral angle of the triangles
     /// x₁x₃x₄ and x₂x₃x₄. `reduced_vectors` are then x₄ − x₃, x₁ − x₃ and x₂ − x₃, in this order. `None` for all other
     /// formulas.
     pub dihedral: Option<[usize; 4]>,
     /// Robust primitives that the formula was compiled to.
-    pub primitives: &'static [&'static str],
+    pub primitives: Cow<'static, [&'static str]>,
     /// Routines and their costs.
-    pub routines: &'static [Routine],
+    pub routines: Cow<'static, [Routine]>,
 }

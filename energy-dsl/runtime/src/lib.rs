@@ -25,7 +25,7 @@ pub use batch::{
 };
 #[doc(hidden)]
 pub use choose::Choose;
-pub use declaration::{Declaration, Field, Kind, OperationCount, Property, Routine};
+pub use declaration::{Declaration, Field, Kind, OperationCount, Property, Routine, SignedPoints};
 pub use element::{
     AnyElement, Block, Constraint, Element, ForceLaw, Inputs, Outputs, Potential, ReducedPotential, Residual,
     RestError, Vector3, triangle_index,

@@ -56,7 +56,7 @@ fn places(declaration: &Declaration) -> Vec<f64> {
 
 /// Measured routine of an element.
 struct Line {
-    element: &'static str,
+    element: String,
     routine: &'static str,
     /// Nanoseconds per element.
     compiled: f64,
@@ -76,7 +76,7 @@ struct Case {
 
 impl Case {
     fn of(declaration: &'static Declaration) -> Self {
-        let element = Interpreted::from_source(declaration.source).expect("it compiles").pop().expect("it is there");
+        let element = Interpreted::from_source(&declaration.source).expect("it compiles").pop().expect("it is there");
         let mut draw = numbers();
         let mut column =
             |input: &InputNumbers| -> Vec<f64> { (0..COUNT * input.size()).map(|_| 1.0 + 0.5 * draw()).collect() };
@@ -114,7 +114,7 @@ impl Case {
     }
 
     fn line(&self, routine: &'static str, compiled: impl FnMut(), tape: impl FnMut()) -> Line {
-        let element = self.elements.element().declaration().name;
+        let element = self.elements.element().declaration().name.to_string();
         let [compiled, tape] = fastest(compiled, tape).map(|seconds| 1e9 * seconds / COUNT as f64);
         Line { element, routine, compiled, tape }
     }
@@ -274,7 +274,7 @@ fn assert_same(lines: &[Line], results: &[(&Vec<f64>, &Vec<f64>)]) {
 
 /// Returns the milliseconds from the text of the hinge to its energy, in the fastest of some runs.
 fn first_number() -> f64 {
-    let source = <QuadraticHinge<f64> as energy_dsl::Element>::DECLARATION.source;
+    let source = &<QuadraticHinge<f64> as energy_dsl::Element>::DECLARATION.source;
     let x = [1.0, 0.25, 0.5, -0.75, 0.5, 0.25, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0];
     let run = || {
         let start = Instant::now();

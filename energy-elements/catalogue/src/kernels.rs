@@ -1,5 +1,6 @@
 //! The kernels of elements, in `f64` and `f32`, for every SIMD level: minutes of building.
 
+use std::borrow::Cow;
 use std::ops::Range;
 
 use energy_dsl::{
@@ -13,9 +14,10 @@ use crate::matrices::{hessian_matrices, jacobian_matrices};
 
 /// Whether no routine of an element has more operations than the largest that is compiled.
 const fn is_small(declaration: &Declaration, largest: usize) -> bool {
+    let Cow::Borrowed(routines) = declaration.routines else { return false };
     let mut routine = 0;
-    while routine < declaration.routines.len() {
-        let Routine { name, reduced, .. } = declaration.routines[routine];
+    while routine < routines.len() {
+        let Routine { name, reduced, .. } = routines[routine];
         // Products of Hessians and vectors are not compiled.
         let is_compiled = !matches!(name.as_bytes(), b"hessian_vector");
         if is_compiled && reduced.total() > largest {

@@ -44,7 +44,7 @@ proptest! {
     #[test]
     fn translation_is_exact(x in points(6), shift in points(1), v in points(6)) {
         for entry in catalogue().iter().filter(|e| e.declaration.translation_invariant) {
-            let (name, n) = (entry.declaration.name, 3 * entry.declaration.points.len());
+            let (name, n) = (&*entry.declaration.name, 3 * entry.declaration.points.len());
             let (parameters, rest) = ordinary(name);
             let moved: Vec<f64> = x[..n].iter().enumerate().map(|(i, c)| c + shift[i % 3]).collect();
             let here = evaluate(name, &parameters, &rest, &x[..n], &v[..n]);
@@ -80,7 +80,7 @@ proptest! {
     #[test]
     fn hessians_are_exactly_symmetric(x in points(6)) {
         for entry in catalogue().iter().filter(|e| e.declaration.kind == Kind::Energy) {
-            let (name, n) = (entry.declaration.name, 3 * entry.declaration.points.len());
+            let (name, n) = (&*entry.declaration.name, 3 * entry.declaration.points.len());
             let (parameters, rest) = ordinary(name);
             let outputs = evaluate(name, &parameters, &rest, &x[..n], &[]);
             let hessian = block(&outputs, "hess");

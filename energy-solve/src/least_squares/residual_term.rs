@@ -45,7 +45,7 @@ pub trait LeastSquaresTerm<const D: usize>: Debug + Sync {
     /// The term's name, for people.
     fn name(&self) -> &str;
     /// The declaration of the term's elements.
-    fn declaration(&self) -> &'static Declaration;
+    fn declaration(&self) -> &Declaration;
     /// The number of elements.
     fn len(&self) -> usize;
     /// Whether the term has zero elements.
@@ -285,7 +285,7 @@ impl<E: PackedResidual<f64> + Debug, const D: usize> LeastSquaresTerm<D> for Res
         &self.name
     }
 
-    fn declaration(&self) -> &'static Declaration {
+    fn declaration(&self) -> &Declaration {
         E::DECLARATION
     }
 

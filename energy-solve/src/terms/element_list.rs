@@ -63,7 +63,7 @@ impl<E: Element> ElementList<E> {
         let list = name.into();
         let (declared, expected) = (E::DECLARATION, E::DECLARATION.points.len());
         if expected != N {
-            return Err(ListError::WrongArity { list, element: declared.name, expected, found: N });
+            return Err(ListError::WrongArity { list, element: &declared.name, expected, found: N });
         }
         if elements.len() != stencils.len() {
             return Err(ListError::CountMismatch { list, elements: elements.len(), stencils: stencils.len() });

@@ -15,7 +15,7 @@ use crate::terms::places::Places;
 use crate::terms::restriction::Restriction;
 use crate::terms::state::State;
 use crate::terms::stencils::Stencils;
-use crate::terms::term::{Character, PlacedTerm, Quantity, Term, TermDescription};
+use crate::terms::term::{Character, MadeFromTerm, PlacedTerm, Quantity, Term, TermDescription};
 
 /// A method that evaluates an element's energy.
 type ValueOf<E> = fn(&E, &<E as ForceLaw<f64>>::Points) -> Value<f64>;
@@ -56,7 +56,7 @@ impl<E: ForceLaw<f64> + Debug + Send> TermDescription for ForceTerm<E> {
         self.list.name()
     }
 
-    fn declaration(&self) -> &'static Declaration {
+    fn declaration(&self) -> &Declaration {
         E::DECLARATION
     }
 
@@ -124,21 +124,9 @@ impl<E: ForceLaw<f64>> PlacedForceTerm<E> {
     }
 }
 
-impl<E: ForceLaw<f64> + Debug + Send + Sync> TermDescription for PlacedForceTerm<E> {
-    fn name(&self) -> &str {
-        self.term.name()
-    }
-
-    fn declaration(&self) -> &'static Declaration {
-        self.term.declaration()
-    }
-
-    fn character(&self) -> Character {
-        self.term.character()
-    }
-
-    fn stencils(&self) -> Stencils<'_> {
-        self.term.stencils()
+impl<E: ForceLaw<f64> + Debug + Send + Sync> MadeFromTerm for PlacedForceTerm<E> {
+    fn term(&self) -> &dyn TermDescription {
+        &*self.term
     }
 }
 

@@ -13,7 +13,7 @@ use crate::terms::curvature::{Curvature, MOST, change_dense, is_semi_definite};
 use crate::terms::linearisation::Linearisation;
 use crate::terms::state::{State, StepStart};
 use crate::terms::stencils::Stencils;
-use crate::terms::term::{Character, PlacedTerm, Quantity, Term, TermDescription};
+use crate::terms::term::{Character, MadeFromTerm, PlacedTerm, Quantity, Term, TermDescription};
 
 /// The results that an [`OwnLaw`] is asked for. Each includes those before it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -44,7 +44,7 @@ pub struct OwnResults {
 /// A force or an energy of all elements of a term, as a function of the positions and velocities of their points.
 pub trait OwnLaw: Debug + Send + Sync {
     /// The declaration of one element.
-    fn declaration(&self) -> &'static Declaration;
+    fn declaration(&self) -> &Declaration;
     /// The number of vertices of one element.
     fn points(&self) -> usize {
         self.declaration().points.len()
@@ -91,7 +91,7 @@ impl<L: OwnLaw> TermDescription for OwnTerm<L> {
         &self.name
     }
 
-    fn declaration(&self) -> &'static Declaration {
+    fn declaration(&self) -> &Declaration {
         self.law.declaration()
     }
 
@@ -244,21 +244,9 @@ fn block(matrix: &[f64], n: usize, i: usize, j: usize) -> Block<f64> {
     std::array::from_fn(|row| std::array::from_fn(|column| matrix[(3 * i + row) * 3 * n + 3 * j + column]))
 }
 
-impl<L: OwnLaw> TermDescription for PlacedOwnTerm<L> {
-    fn name(&self) -> &str {
-        self.term.name()
-    }
-
-    fn declaration(&self) -> &'static Declaration {
-        self.term.declaration()
-    }
-
-    fn character(&self) -> Character {
-        self.term.character()
-    }
-
-    fn stencils(&self) -> Stencils<'_> {
-        self.term.stencils()
+impl<L: OwnLaw> MadeFromTerm for PlacedOwnTerm<L> {
+    fn term(&self) -> &dyn TermDescription {
+        &self.term
     }
 }
 

@@ -45,11 +45,35 @@ pub trait TermDescription: std::fmt::Debug + Send {
     /// The term's name, for people: "structural springs".
     fn name(&self) -> &str;
     /// The declaration of the term's elements.
-    fn declaration(&self) -> &'static Declaration;
+    fn declaration(&self) -> &Declaration;
     /// The properties of the term's force.
     fn character(&self) -> Character;
     /// The vertices of each element.
     fn stencils(&self) -> Stencils<'_>;
+}
+
+/// A placed term that keeps the term from which it was made. It has the same description.
+pub(crate) trait MadeFromTerm: std::fmt::Debug + Send {
+    /// Returns the term.
+    fn term(&self) -> &dyn TermDescription;
+}
+
+impl<P: MadeFromTerm> TermDescription for P {
+    fn name(&self) -> &str {
+        self.term().name()
+    }
+
+    fn declaration(&self) -> &Declaration {
+        self.term().declaration()
+    }
+
+    fn character(&self) -> Character {
+        self.term().character()
+    }
+
+    fn stencils(&self) -> Stencils<'_> {
+        self.term().stencils()
+    }
 }
 
 /// Elements of one type, to become part of a [`System`](crate::System).

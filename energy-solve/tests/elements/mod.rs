@@ -1,34 +1,42 @@
 //! Two elements written by hand, to test assembly and solvers independently of generated code.
 
+use std::borrow::Cow::Borrowed;
+
 use energy_dsl::{
     Block, Declaration, Element, Field, Flags, ForceJacobians, ForceLaw, ForceValue, Gradient, Hessian, Inputs, Kind,
     Lane, Outputs, PackedPotential, Potential, Real, ReducedHessian, ReducedPotential, RestError, Stored, Value,
     Vector3,
 };
 
-const fn declaration(name: &'static str, kind: Kind, formula: &'static str, rows: usize) -> Declaration {
-    const POINT: Field = Field { name: "p", size: 3, unit: "m" };
+const fn declaration(
+    name: &'static str,
+    kind: Kind,
+    formula: &'static str,
+    rows: usize,
+    quadratic: bool,
+) -> Declaration {
+    const POINT: Field = Field { name: Borrowed("p"), size: 3, unit: Borrowed("m") };
     Declaration {
-        name,
+        name: Borrowed(name),
         kind,
-        docs: "",
-        formula,
-        source: "",
-        points: &[POINT, POINT],
-        rest: &[],
-        parameters: &[],
+        docs: Borrowed(""),
+        formula: Borrowed(formula),
+        source: Borrowed(""),
+        points: Borrowed(&[POINT, POINT]),
+        rest: Borrowed(&[]),
+        parameters: Borrowed(&[]),
         rows,
-        properties: &[],
+        properties: Borrowed(&[]),
         translation_invariant: true,
         curved: true,
-        quadratic: false,
+        quadratic,
         velocity_dependent: matches!(kind, Kind::Force),
         symmetric: matches!(kind, Kind::Energy),
         reduced_coordinates: 3,
-        reduced_vectors: &[&[(0, true), (1, false)]],
+        reduced_vectors: Borrowed(&[Borrowed(&[(0, true), (1, false)])]),
         dihedral: None,
-        primitives: &[],
-        routines: &[],
+        primitives: Borrowed(&[]),
+        routines: Borrowed(&[]),
     }
 }
 
@@ -68,12 +76,11 @@ impl<T: Real, const SLACK: bool> AnySpring<T, SLACK> {
 }
 
 impl<T: Real, const SLACK: bool> Element for AnySpring<T, SLACK> {
-    const DECLARATION: &'static Declaration =
-        &Declaration { quadratic: SLACK, ..declaration("Spring", Kind::Energy, "k/2 (‖p − q‖ − L)²", 1) };
+    const DECLARATION: &'static Declaration = &declaration("Spring", Kind::Energy, "k/2 (‖p − q‖ − L)²", 1, SLACK);
     type Over<R: Real> = AnySpring<R, SLACK>;
 
     fn evaluate<R: Real>(_: &Inputs<'_, R>) -> Result<Outputs<R>, RestError> {
-        Err(RestError { element: "Spring" })
+        Err(RestError { element: "Spring".into() })
     }
 }
 
@@ -150,11 +157,11 @@ pub(crate) struct Damper {
 }
 
 impl Element for Damper {
-    const DECLARATION: &'static Declaration = &declaration("Damper", Kind::Force, "−c ‖d‖² w − d (e·w)", 6);
+    const DECLARATION: &'static Declaration = &declaration("Damper", Kind::Force, "−c ‖d‖² w − d (e·w)", 6, false);
     type Over<T: Real> = Self;
 
     fn evaluate<T: Real>(_: &Inputs<'_, T>) -> Result<Outputs<T>, RestError> {
-        Err(RestError { element: "Damper" })
+        Err(RestError { element: "Damper".into() })
     }
 }
 

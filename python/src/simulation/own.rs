@@ -3,7 +3,7 @@
 use std::fmt;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use cloth_core::simulation::OwnForce;
+use cloth_core::simulation::{OwnElements, OwnForce};
 use energy_compiler::Elements as Tapes;
 use energy_dsl::{Declaration, Element as _, Kind, energy};
 use energy_solve::{Character, Order, OwnLaw, OwnResults, OwnTerm, SteeredTapeTerm, SteeredTapes, Term};
@@ -19,15 +19,18 @@ use crate::system::laws::{SharedElements, TextForce, TextResidual, lock};
 
 /// A force or an energy of a text, whose parameters change between steps.
 pub struct OwnText {
-    name: String,
+    pub on: OwnElements,
     pub element: Element,
-    points: usize,
-    pub vertices: Vec<usize>,
     /// Copies of the inputs.
     pub inputs: Mutex<Py<PyDict>>,
     elements: Mutex<Tapes<f64>>,
     /// How new parameters reach the terms.
     handles: Mutex<Vec<Handle>>,
+}
+
+fn on(name: &str, points: usize, stencils: Vec<u32>) -> OwnElements {
+    let vertices = stencils.into_iter().map(|vertex| vertex as usize).collect();
+    OwnElements { name: name.to_owned(), points, vertices }
 }
 
 enum Handle {
@@ -56,10 +59,8 @@ impl OwnText {
         let stencils = stencils_of(stencils, points, vertices)?;
         let elements = element.tapes(py, stencils.len() / points.max(1), Some(inputs))?;
         Ok(Self {
-            name: name.to_owned(),
+            on: on(name, points, stencils),
             element: element.clone(),
-            points,
-            vertices: stencils.into_iter().map(|vertex| vertex as usize).collect(),
             inputs: Mutex::new(copied(py, Some(inputs))?),
             elements: Mutex::new(elements),
             handles: Mutex::default(),
@@ -71,7 +72,7 @@ impl OwnText {
         let mut known = self.inputs.lock().unwrap_or_else(PoisonError::into_inner);
         let merged = known.bind(py).copy()?;
         merged.update(copied(py, Some(inputs))?.bind(py).as_mapping())?;
-        let count = self.vertices.len() / self.points.max(1);
+        let count = self.on.vertices.len() / self.on.points.max(1);
         let elements = self.element.tapes::<f64>(py, count, Some(&merged))?;
         for handle in &*self.handles.lock().unwrap_or_else(PoisonError::into_inner) {
             match handle {
@@ -86,16 +87,8 @@ impl OwnText {
 }
 
 impl OwnForce for OwnText {
-    fn name(&self) -> String {
-        self.name.clone()
-    }
-
-    fn points(&self) -> usize {
-        self.points
-    }
-
-    fn vertices(&self) -> &[usize] {
-        &self.vertices
+    fn elements(&self) -> &OwnElements {
+        &self.on
     }
 
     fn is_whole(&self) -> bool {
@@ -111,7 +104,7 @@ impl OwnForce for OwnText {
             Handle::Energy(_, tapes) => tapes.is_shared(),
             Handle::Whole(shared) => Arc::strong_count(shared) > 1,
         });
-        let name = self.name.clone();
+        let name = self.on.name.clone();
         if !self.is_whole() {
             let tapes = SteeredTapes::new(elements.tape().selected(numbers));
             handles.push(Handle::Energy(numbers.to_vec(), tapes.clone()));
@@ -121,8 +114,8 @@ impl OwnForce for OwnText {
         let shared: SharedElements = Arc::new(Mutex::new(elements));
         handles.push(Handle::Whole(Arc::clone(&shared)));
         match declaration.kind {
-            Kind::Force => Box::new(OwnTerm::new(name, TextForce(shared), vertices)),
-            _ => Box::new(OwnTerm::new(name, TextResidual { elements: shared, points: self.points }, vertices)),
+            Kind::Force => Box::new(OwnTerm::new(name, TextForce::new(shared), vertices)),
+            _ => Box::new(OwnTerm::new(name, TextResidual::new(shared, self.on.points), vertices)),
         }
     }
 }
@@ -140,10 +133,8 @@ energy! {
 /// A force or an energy that a function of Python evaluates.
 #[derive(Clone)]
 pub struct OwnFunction {
-    name: String,
+    pub on: OwnElements,
     pub function: Arc<Py<PyAny>>,
-    points: usize,
-    pub vertices: Vec<usize>,
     /// Whether the function is an energy; else it is a force.
     is_energy: bool,
     /// Whether the function returns Jacobians.
@@ -170,18 +161,8 @@ impl OwnFunction {
             return Err(PyValueError::new_err(format!("{name}: expected at least one vertex for each element")));
         }
         let stencils = stencils_of(&given, points, vertices)?;
-        let vertices = stencils.into_iter().map(|vertex| vertex as usize).collect();
-        let function = Arc::new(function);
-        Ok(Self {
-            name: name.to_owned(),
-            function,
-            points,
-            vertices,
-            is_energy,
-            has_jacobians,
-            fixed: Vec::new(),
-            raised,
-        })
+        let (on, function) = (on(name, points, stencils), Arc::new(function));
+        Ok(Self { on, function, is_energy, has_jacobians, fixed: Vec::new(), raised })
     }
 
     /// Whether integrators evaluate the force, with its Jacobians, at the end of a step.
@@ -200,7 +181,7 @@ impl OwnFunction {
 
     /// Calls the function, and writes what it returns.
     fn call(&self, py: Python<'_>, order: Order, x: &[f64], v: &[f64], results: &mut OwnResults) -> PyResult<()> {
-        let (n, points) = (x.len() / (3 * self.points), self.points);
+        let (n, points) = (x.len() / (3 * self.on.points), self.on.points);
         let number = match order {
             Order::Energy => 0,
             Order::Force => 1,
@@ -221,12 +202,12 @@ impl OwnFunction {
         let (vectors, matrix) = ([n, points, 3], [n, 3 * points, 3 * points]);
         let part = |at: usize, what: &str, shape: &[usize], to: &mut [f64], sign: f64| {
             let Some(given) = parts.get(at).filter(|given| !given.is_none()) else {
-                let message = format!("{}: expected {what} as result {at} at order {number}", self.name);
+                let message = format!("{}: expected {what} as result {at} at order {number}", self.on.name);
                 return Err(PyValueError::new_err(message));
             };
             let given = array::<f64>(what, given)?;
             if given.shape() != shape {
-                return Err(wrong_shape(&format!("{}, {what}", self.name), &tuple(shape), given.shape()));
+                return Err(wrong_shape(&format!("{}, {what}", self.on.name), &tuple(shape), given.shape()));
             }
             let given = given.as_slice().map_err(|error| PyValueError::new_err(error.to_string()))?;
             to.iter_mut().zip(given).for_each(|(to, given)| *to = sign * given);
@@ -253,21 +234,13 @@ impl OwnFunction {
 
 impl fmt::Debug for OwnFunction {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("OwnFunction").field("name", &self.name).finish_non_exhaustive()
+        f.debug_struct("OwnFunction").field("name", &self.on.name).finish_non_exhaustive()
     }
 }
 
 impl OwnForce for OwnFunction {
-    fn name(&self) -> String {
-        self.name.clone()
-    }
-
-    fn points(&self) -> usize {
-        self.points
-    }
-
-    fn vertices(&self) -> &[usize] {
-        &self.vertices
+    fn elements(&self) -> &OwnElements {
+        &self.on
     }
 
     fn is_whole(&self) -> bool {
@@ -275,17 +248,17 @@ impl OwnForce for OwnFunction {
     }
 
     fn term(&self, _: &[usize], vertices: Vec<u32>) -> Box<dyn Term> {
-        Box::new(OwnTerm::new(self.name.clone(), self.clone(), vertices))
+        Box::new(OwnTerm::new(self.on.name.clone(), self.clone(), vertices))
     }
 }
 
 impl OwnLaw for OwnFunction {
-    fn declaration(&self) -> &'static Declaration {
+    fn declaration(&self) -> &Declaration {
         if self.is_energy { PythonEnergy::<f64>::DECLARATION } else { PythonForce::<f64>::DECLARATION }
     }
 
     fn points(&self) -> usize {
-        self.points
+        self.on.points
     }
 
     fn character(&self) -> Character {
@@ -302,7 +275,7 @@ impl OwnLaw for OwnFunction {
     fn evaluate(&self, order: Order, x: &[f64], v: &[f64], results: &mut OwnResults) {
         if self.is_fixed() {
             // The potential −f · x of a constant force.
-            let elements = self.fixed.chunks(3 * self.points).zip(x.chunks(3 * self.points));
+            let elements = self.fixed.chunks(3 * self.on.points).zip(x.chunks(3 * self.on.points));
             for (energy, (force, x)) in results.energies.iter_mut().zip(elements) {
                 *energy = -force.iter().zip(x).map(|(f, x)| f * x).sum::<f64>();
             }

@@ -90,10 +90,10 @@ impl TermSource {
             Handle::Constant => Box::new(TapeTerm::new(name, declaration, self.elements.tape().clone(), vertices)),
             Handle::Steered(tapes) => Box::new(SteeredTapeTerm::new(name, declaration, tapes.clone(), vertices)),
             Handle::Shared(elements) if declaration.kind == Kind::Force => {
-                Box::new(OwnTerm::new(name, TextForce(Arc::clone(elements)), self.vertices.clone()))
+                Box::new(OwnTerm::new(name, TextForce::new(Arc::clone(elements)), self.vertices.clone()))
             }
             Handle::Shared(elements) => {
-                let law = TextResidual { elements: Arc::clone(elements), points: self.points };
+                let law = TextResidual::new(Arc::clone(elements), self.points);
                 Box::new(OwnTerm::new(name, law, self.vertices.clone()))
             }
         }

@@ -11,11 +11,21 @@ pub type SharedElements = Arc<Mutex<Tapes<f64>>>;
 
 /// A force law f(x, v) of a text.
 #[derive(Debug)]
-pub struct TextForce(pub SharedElements);
+pub struct TextForce {
+    declaration: Arc<Declaration>,
+    elements: SharedElements,
+}
+
+impl TextForce {
+    pub fn new(elements: SharedElements) -> Self {
+        let declaration = Arc::clone(lock(&elements).element().declaration());
+        Self { declaration, elements }
+    }
+}
 
 impl OwnLaw for TextForce {
-    fn declaration(&self) -> &'static Declaration {
-        lock(&self.0).element().declaration()
+    fn declaration(&self) -> &Declaration {
+        &self.declaration
     }
 
     fn character(&self) -> Character {
@@ -28,7 +38,7 @@ impl OwnLaw for TextForce {
     }
 
     fn evaluate(&self, order: Order, x: &[f64], v: &[f64], results: &mut OwnResults) {
-        let tapes = lock(&self.0);
+        let tapes = lock(&self.elements);
         let all = 0..tapes.len();
         // Laws without velocities are not given any.
         let still = vec![0.0; if v.is_empty() { x.len() } else { 0 }];
@@ -57,14 +67,22 @@ impl OwnLaw for TextForce {
 /// Gauss and Newton, Jᵀ J.
 #[derive(Debug)]
 pub struct TextResidual {
-    pub elements: SharedElements,
+    declaration: Arc<Declaration>,
+    elements: SharedElements,
     /// Vertices of one element: a third of its unknowns.
-    pub points: usize,
+    points: usize,
+}
+
+impl TextResidual {
+    pub fn new(elements: SharedElements, points: usize) -> Self {
+        let declaration = Arc::clone(lock(&elements).element().declaration());
+        Self { declaration, elements, points }
+    }
 }
 
 impl OwnLaw for TextResidual {
-    fn declaration(&self) -> &'static Declaration {
-        lock(&self.elements).element().declaration()
+    fn declaration(&self) -> &Declaration {
+        &self.declaration
     }
 
     fn points(&self) -> usize {
@@ -81,7 +99,7 @@ impl OwnLaw for TextResidual {
 
     fn evaluate(&self, order: Order, x: &[f64], _v: &[f64], results: &mut OwnResults) {
         let tapes = lock(&self.elements);
-        let (count, rows, unknowns) = (tapes.len(), tapes.element().declaration().rows, 3 * self.points);
+        let (count, rows, unknowns) = (tapes.len(), self.declaration.rows, 3 * self.points);
         let (mut r, mut jacobians) = (vec![0.0; count * rows], vec![0.0; count * rows * unknowns]);
         let evaluated = match order {
             Order::Energy => tapes.residuals(0..count, x, &mut r),

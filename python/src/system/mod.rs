@@ -119,7 +119,7 @@ impl System {
         let points = match declaration.kind {
             Kind::Residual if element.unknown_count().is_multiple_of(3) => element.unknown_count() / 3,
             Kind::Residual => {
-                let (name, found) = (declaration.name, element.unknown_count());
+                let (name, found) = (&declaration.name, element.unknown_count());
                 let message = format!("{name}: expected three unknowns for each vertex, got {found} unknowns");
                 return Err(PyTypeError::new_err(message));
             }
@@ -159,7 +159,8 @@ impl System {
     fn energy(&self, x: &Bound<'_, PyAny>) -> PyResult<f64> {
         let (py, positions, mut state) = (x.py(), self.vectors("x", x)?, self.state()?);
         let state = &mut *state;
-        py.detach(|| state.energy(&positions)).map_err(PyErr::from)
+        // The sum of no terms is −0.
+        py.detach(|| state.energy(&positions)).map(|energy| energy + 0.0).map_err(PyErr::from)
     }
 
     /// Returns U of each term; `None` for forces.
@@ -337,6 +338,10 @@ impl System {
 }
 
 fn mask(vertices: usize, pinned: Vec<usize>) -> PyResult<Vec<bool>> {
+    // Terms number vertices by `u32`.
+    if u32::try_from(vertices).is_err() {
+        return Err(PyValueError::new_err(format!("vertices: expected at most {}, got {vertices}", u32::MAX)));
+    }
     let mut mask = vec![false; vertices];
     for vertex in pinned {
         let message = || format!("pinned: there is no vertex {vertex}, only 0 to {}", vertices.saturating_sub(1));

@@ -51,7 +51,7 @@ fn overview(page: &mut String, report: &Report) {
         let faults =
             section.mutations.as_ref().map_or("–".into(), |m| format!("{} of {}", m.caught(), m.mutants.len()));
         let passed = report.lines.iter().filter(|l| l.element == section.element).all(|l| l.passed);
-        let name = escaped(section.element);
+        let name = escaped(&section.element);
         let _ = writeln!(
             page,
             "<tr><td><a href=\"#{name}\">{name}</a></td>\
@@ -73,20 +73,20 @@ fn verdict(passed: bool) -> &'static str {
 }
 
 fn element(page: &mut String, report: &Report, section: &Section) {
-    let name = escaped(section.element);
+    let name = escaped(&section.element);
     let _ = writeln!(page, "<section id=\"{name}\"><h2>{name} <small>{}</small></h2>", section.kind);
-    let _ = writeln!(page, "<p>{}</p>", escaped(section.docs));
-    match energy_compiler::mathml(section.source) {
+    let _ = writeln!(page, "<p>{}</p>", escaped(&section.docs));
+    match energy_compiler::mathml(&section.source) {
         Some(formula) => page.push_str(&formula),
         None => {
-            let _ = writeln!(page, "<pre>{}</pre>", escaped(section.source));
+            let _ = writeln!(page, "<pre>{}</pre>", escaped(&section.source));
         }
     }
     for line in report.failures().filter(|line| line.element == section.element) {
         let _ = writeln!(page, "<pre class=\"failed\">{}</pre>", escaped(&describe_failure(line)));
     }
     for warning in &section.warnings {
-        let _ = writeln!(page, "<pre>warning: {}</pre>", escaped(&warning.describe(section.element)));
+        let _ = writeln!(page, "<pre>warning: {}</pre>", escaped(&warning.describe(&section.element)));
     }
     accuracy(page, section);
     checks(page, report, section);

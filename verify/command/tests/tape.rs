@@ -23,7 +23,7 @@ fn bits(outputs: &Outputs<f64>) -> (Vec<u64>, Vec<bool>) {
 fn assert_same(entry: &AnyElement, element: &Interpreted, sample: &Sample) {
     let inputs = sample.inputs();
     let (compiled, tape) = ((entry.evaluate)(&inputs), element.evaluate(&inputs));
-    let name = entry.declaration.name;
+    let name = &*entry.declaration.name;
     match (compiled, tape) {
         (Ok(compiled), Ok(tape)) => {
             let ((a, of_a), (b, of_b)) = (bits(&compiled), bits(&tape));
@@ -41,7 +41,7 @@ fn assert_same(entry: &AnyElement, element: &Interpreted, sample: &Sample) {
 }
 
 fn element(declaration: &Declaration) -> Interpreted {
-    Interpreted::from_source(declaration.source).expect("it compiles").pop().expect("it declares the element")
+    Interpreted::from_source(&declaration.source).expect("it compiles").pop().expect("it declares the element")
 }
 
 /// Ordinary inputs, inputs on a lattice, inputs with zeros, coincidences and extreme sizes, and sweeps to every
@@ -128,7 +128,7 @@ fn blocks_have_the_bits_of_single_elements() {
                 a.len() == b.len()
                     && a.iter().zip(b).all(|(a, b)| a.to_bits() == b.to_bits() || a.is_nan() && b.is_nan())
             };
-            let name = entry.declaration.name;
+            let name = &*entry.declaration.name;
             assert!(same(block(names[0]), &values[index * first..][..first]), "{name}: values of {sample:?}");
             assert!(same(block(names[1]), &matrices[index * second..][..second]), "{name}: matrix of {sample:?}");
             let flags = alone.flags[if entry.declaration.kind == Kind::Energy { 2 } else { 1 }];

@@ -35,9 +35,9 @@ pub fn amplification(subject: &Subject, sample: &Sample, answer: &Answer, block:
     let geometry = (0..16).map(|_| Perturbed::Geometry);
     let parameters = (0..8).map(|_| Perturbed::Parameters);
     // If points do not enter as edges, parameters are perturbed with them.
-    let by_edges = enters_as_edges(subject.declaration) && !sample.parameters.is_empty();
+    let by_edges = enters_as_edges(&subject.declaration) && !sample.parameters.is_empty();
     for what in geometry.chain(parameters.filter(|_| by_edges)) {
-        let moved = perturbed(subject.declaration, sample, what, &mut random);
+        let moved = perturbed(&subject.declaration, sample, what, &mut random);
         let Ok(there) = subject.answer(&moved) else { continue };
         let change = here.numbers.iter().zip(&there.block(block).numbers).map(|(a, b)| (a - b).abs()).fold(0.0, worse);
         let kappa = change / here.largest() / PERTURBATION;
@@ -97,7 +97,7 @@ fn offset(declaration: &Declaration, sample: &Sample, (what, size): (Perturbed, 
         true => edges(&sample.positions, 3, &mut nudge),
         false => all(&sample.positions, &mut nudge),
     };
-    let rest = match dimension(declaration.rest) {
+    let rest = match dimension(&declaration.rest) {
         Some(dimension) => edges(&sample.rest, dimension, &mut nudge),
         None => all(&sample.rest, &mut nudge),
     };
@@ -110,12 +110,12 @@ fn offset(declaration: &Declaration, sample: &Sample, (what, size): (Perturbed, 
 /// a roundoff: near a singularity, larger perturbations would leave its neighbourhood.
 pub(super) fn true_amplifications(subject: &Subject, sample: &Sample, here: &[TrueBlock]) -> (Vec<f64>, usize) {
     let mut random = Rng::with_seed(1);
-    let parameters = enters_as_edges(subject.declaration) && !sample.parameters.is_empty();
+    let parameters = enters_as_edges(&subject.declaration) && !sample.parameters.is_empty();
     let patterns = [Perturbed::Geometry; 3].into_iter().chain(parameters.then_some(Perturbed::Parameters));
     let (mut most, mut bits) = (vec![0.0_f64; here.len()], 0);
     for what in patterns {
-        let offset = offset(subject.declaration, sample, (what, ROUNDOFF), &mut random);
-        let there = truth_of_extreme(subject.declaration, &subject.formula, sample, Some(&offset), DIGITS);
+        let offset = offset(&subject.declaration, sample, (what, ROUNDOFF), &mut random);
+        let there = truth_of_extreme(&subject.declaration, &subject.formula, sample, Some(&offset), DIGITS);
         bits += there.bits;
         for (number, (a, b)) in here.iter().zip(&there.blocks).enumerate() {
             let pairs = a.block.numbers.iter().zip(&b.block.numbers);

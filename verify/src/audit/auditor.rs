@@ -13,7 +13,7 @@ use crate::sample::Sample;
 /// The element under audit, and the findings so far.
 pub(super) struct Auditor<'a> {
     pub(super) subject: &'a Subject,
-    pub(super) declaration: &'static Declaration,
+    pub(super) declaration: &'a Declaration,
     pub(super) lines: Vec<Line>,
     places: BTreeMap<(Check, BlockName), usize>,
     /// For each derivative, the number of inputs, and of those where differences stayed on one side of every kink.
@@ -33,7 +33,7 @@ impl<'a> Auditor<'a> {
     pub(super) fn new(subject: &'a Subject) -> Self {
         Self {
             subject,
-            declaration: subject.declaration,
+            declaration: &subject.declaration,
             lines: Vec::new(),
             places: BTreeMap::new(),
             differences: BTreeMap::new(),
@@ -77,10 +77,10 @@ impl<'a> Auditor<'a> {
     /// Records a finding. `detail` is evaluated only if it is the worst of its check and block.
     pub(super) fn record(&mut self, finding: &Finding<'_>, detail: impl FnOnce() -> String) {
         let &Finding { check, block, error, order, sample } = finding;
-        let (element, tolerance) = (self.declaration.name, self.subject.tolerance(check));
+        let tolerance = self.subject.tolerance(check);
         let lines = &mut self.lines;
         let at = *self.places.entry((check, block)).or_insert_with(|| {
-            lines.push(Line::new(element, block, check, tolerance));
+            lines.push(Line::new(self.declaration.name.clone(), block, check, tolerance));
             lines.len() - 1
         });
         let line = &mut self.lines[at];

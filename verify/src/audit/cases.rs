@@ -108,7 +108,7 @@ pub(super) fn cases(subject: &Subject, samples: usize, with_truth: usize, seed: 
 
 struct Drawing<'a> {
     subject: &'a Subject,
-    sampler: Sampler,
+    sampler: Sampler<'a>,
     outside: usize,
     outside_inputs: Vec<Sample>,
 }

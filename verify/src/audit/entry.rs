@@ -6,7 +6,7 @@ use crate::blocks::{Block, BlockName};
 pub(super) fn entry_name(declaration: &Declaration, block: &Block, entry: usize) -> String {
     let coordinate = |number: usize| {
         let mut number = number;
-        for point in declaration.points {
+        for point in &*declaration.points {
             if number < point.size {
                 let axis =
                     if point.size == 1 { String::new() } else { format!(".{}", ["x", "y", "z", "w"][number.min(3)]) };

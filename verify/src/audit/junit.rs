@@ -13,7 +13,7 @@ pub fn junit(report: &Report) -> String {
         let mut case = |name: &str, failure: Option<String>| {
             own += 1;
             let name = escaped(name);
-            let class = escaped(section.element);
+            let class = escaped(&section.element);
             let _ = match failure {
                 None => writeln!(cases, "    <testcase classname=\"{class}\" name=\"{name}\"/>"),
                 Some(text) => {
@@ -34,7 +34,7 @@ pub fn junit(report: &Report) -> String {
             let missed = mutant.caught_by.is_empty().then(|| "no check noticed it".to_owned());
             case(&format!("planted fault: {}", mutant.fault), missed);
         }
-        let name = escaped(section.element);
+        let name = escaped(&section.element);
         let _ = writeln!(
             suites,
             "  <testsuite name=\"{name}\" tests=\"{own}\" failures=\"{failed}\">\n{cases}  </testsuite>"

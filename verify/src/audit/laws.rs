@@ -185,11 +185,12 @@ impl Auditor<'_> {
             Kind::Constraint | Kind::Residual => return Ok(()),
         };
         if !has_points(declaration)
-            || !declaration.rest.iter().chain(declaration.parameters).all(|f| !f.unit.is_empty())
+            || !declaration.rest.iter().chain(&*declaration.parameters).all(|f| !f.unit.is_empty())
         {
             return Ok(());
         }
-        let annotated = declaration.rest.iter().chain(declaration.parameters).any(|f| f.unit != "1" && f.unit != "rad");
+        let annotated =
+            declaration.rest.iter().chain(&*declaration.parameters).any(|f| f.unit != "1" && f.unit != "rad");
         let Some(exponents) = fields(declaration).collect::<Option<Vec<_>>>() else { return Ok(()) };
         if !annotated {
             return Ok(());
@@ -328,8 +329,8 @@ fn power([kilograms, metres, seconds]: [f64; 3]) -> i32 {
 
 /// Returns the unit of each number of the rest shape, then of the parameters.
 fn fields(declaration: &energy_dsl::Declaration) -> impl Iterator<Item = Option<[f64; 3]>> {
-    let all = declaration.rest.iter().chain(declaration.parameters);
-    all.flat_map(|field| std::iter::repeat_n(unit_exponents(field.unit), field.size))
+    let all = declaration.rest.iter().chain(&*declaration.parameters);
+    all.flat_map(|field| std::iter::repeat_n(unit_exponents(&field.unit), field.size))
 }
 
 /// Returns the position and size of the largest difference.

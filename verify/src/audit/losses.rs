@@ -94,7 +94,7 @@ impl Auditor<'_> {
             return;
         }
         let Ok(answer) = self.answer(sample) else { return };
-        let truth = truth_of_extreme(subject.declaration, &subject.formula, sample, None, DIGITS);
+        let truth = truth_of_extreme(&subject.declaration, &subject.formula, sample, None, DIGITS);
         subject.meter.truth(truth.bits);
         losses.inputs += 1;
         let (mut kappas, mut limits) = (None, None);
@@ -145,7 +145,7 @@ impl Auditor<'_> {
                 rest: none(&sample.rest),
                 velocities: none(&sample.velocities),
             };
-            let near = truth_of_extreme(subject.declaration, &subject.formula, sample, Some(&offset), DIGITS);
+            let near = truth_of_extreme(&subject.declaration, &subject.formula, sample, Some(&offset), DIGITS);
             subject.meter.truth(near.bits);
             let defined = near.blocks.into_iter().map(|block| block.is_defined.then_some(block));
             found = Some(match found {

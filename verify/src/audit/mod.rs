@@ -18,6 +18,7 @@ mod report;
 mod routes;
 mod subject;
 
+use std::borrow::Cow;
 use std::num::NonZero;
 
 use energy_dsl::{AnyElement, Declaration, Element};
@@ -102,10 +103,10 @@ impl Options {
 pub fn targets_in(catalogue: &'static [AnyElement], names: &[&str]) -> Result<Vec<Target>, String> {
     let has = |name: &str| catalogue.iter().any(|entry| entry.declaration.name == name);
     if let Some(unknown) = names.iter().find(|name| !has(name)) {
-        let known = catalogue.iter().map(|entry| entry.declaration.name).collect::<Vec<_>>().join(", ");
+        let known = catalogue.iter().map(|entry| &*entry.declaration.name).collect::<Vec<_>>().join(", ");
         return Err(format!("no declared element is called {unknown}; there are {known}"));
     }
-    let chosen = catalogue.iter().filter(|e| names.is_empty() || names.contains(&e.declaration.name));
+    let chosen = catalogue.iter().filter(|e| names.is_empty() || names.contains(&&*e.declaration.name));
     Ok(chosen.map(Target::of_element).collect())
 }
 
@@ -138,7 +139,7 @@ fn audit_target(target: &Target, energy: Option<&Target>, options: Options) -> R
 /// If the element cannot be audited, or the input does not fit it.
 pub fn audit_at(target: &Target, energy: Option<&Target>, sample: &Sample) -> Result<Report, String> {
     let subject = target.subject()?;
-    sample.fits(subject.declaration)?;
+    sample.fits(&subject.declaration)?;
     let turn = Rotation::from_unit_quaternion([0.5, -0.5, 0.5, 0.5]);
     let case = Case::new(&subject, sample.clone(), turn, true);
     let mut section = section(&subject, 1);
@@ -153,8 +154,9 @@ pub fn audit_at(target: &Target, energy: Option<&Target>, sample: &Sample) -> Re
 /// Audits one generated element. No faults are planted, because that needs its source.
 #[must_use]
 pub fn audit(declaration: &'static Declaration, evaluate: Evaluate, options: Options) -> Report {
-    let report = Subject::new(declaration, Box::new(evaluate), None).and_then(|subject| run(&subject, None, options));
-    report.unwrap_or_else(|why| Report { refused: vec![(declaration.name.into(), why)], ..Report::default() })
+    let report = Subject::new(Cow::Borrowed(declaration), Box::new(evaluate), None)
+        .and_then(|subject| run(&subject, None, options));
+    report.unwrap_or_else(|why| Report { refused: vec![(declaration.name.to_string(), why)], ..Report::default() })
 }
 
 fn run(subject: &Subject, energy: Option<&Subject>, options: Options) -> Result<Report, String> {
@@ -247,12 +249,12 @@ fn look_near_singularities(auditor: &mut Auditor<'_>, budget: &mut Budget<'_>, o
 }
 
 fn section(subject: &Subject, inputs: usize) -> Section {
-    let declaration = subject.declaration;
+    let declaration = &subject.declaration;
     Section {
-        element: declaration.name,
+        element: declaration.name.clone(),
         kind: declaration.kind.keyword(),
-        docs: declaration.docs,
-        source: declaration.source,
+        docs: declaration.docs.clone(),
+        source: declaration.source.clone(),
         inputs,
         without_differences: 0,
         accuracy: Vec::new(),
@@ -285,14 +287,14 @@ fn audit_case(auditor: &mut Auditor<'_>, section: &mut Section, case: &Case<'_>)
 
 /// Compares a force with minus the gradient of an energy at one input.
 fn against_energy(auditor: &mut Auditor<'_>, energy: &Subject, case: &Case<'_>) -> Result<(), String> {
-    let (force, potential) = (auditor.declaration, energy.declaration);
+    let (force, potential) = (auditor.declaration, &energy.declaration);
     if !auditor.subject.has_velocities() {
         return Err(format!("{} is not a force, so it cannot be compared with {}", force.name, potential.name));
     }
     let mut still = case.sample.clone();
     still.velocities.fill(0.0);
     let mut sample = Sample { velocities: Vec::new(), parameters: Vec::new(), ..still.clone() };
-    for wanted in potential.parameters {
+    for wanted in &*potential.parameters {
         let mut numbers = still.parameters.as_slice();
         let found = force.parameters.iter().find_map(|field| {
             let (own, others) = numbers.split_at(field.size);
@@ -310,7 +312,7 @@ fn against_energy(auditor: &mut Auditor<'_>, energy: &Subject, case: &Case<'_>) 
     let answer = auditor.answer(&still).map_err(|e| e.to_string())?;
     let gradient = energy.answer(&sample).map_err(|e| e.to_string())?;
     let expected: Vec<f64> = gradient.block(BlockName::Gradient).numbers.iter().map(|g| -g).collect();
-    auditor.minus_gradient(&still, answer.block(BlockName::Force), &expected, potential.name);
+    auditor.minus_gradient(&still, answer.block(BlockName::Force), &expected, &potential.name);
     Ok(())
 }
 

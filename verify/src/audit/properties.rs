@@ -13,7 +13,7 @@ impl Auditor<'_> {
     pub(super) fn claims(&mut self, case: &Case<'_>, answer: &Answer) -> Result<(), NoAnswer> {
         let sample = &case.sample;
         let turn = |vectors: &[f64]| case.turned(vectors);
-        for property in self.declaration.properties {
+        for property in &*self.declaration.properties {
             let (moved, expected) = match property {
                 // The compiler proved this property.
                 Property::TranslationInvariant => continue,

@@ -1,3 +1,5 @@
+use std::borrow::Cow;
+
 use serde::Serialize;
 
 use crate::blocks::BlockName;
@@ -115,7 +117,7 @@ impl Check {
 #[derive(Clone, Debug, Serialize)]
 pub struct Line {
     /// Name of the element.
-    pub element: &'static str,
+    pub element: Cow<'static, str>,
     /// Name of the block.
     pub block: BlockName,
     /// Property that was checked.
@@ -137,7 +139,7 @@ pub struct Line {
 }
 
 impl Line {
-    pub(super) fn new(element: &'static str, block: BlockName, check: Check, tolerance: f64) -> Self {
+    pub(super) fn new(element: Cow<'static, str>, block: BlockName, check: Check, tolerance: f64) -> Self {
         Self {
             element,
             block,
@@ -274,13 +276,13 @@ impl Warning {
 #[derive(Clone, Debug, Serialize)]
 pub struct Section {
     /// Name of the element.
-    pub element: &'static str,
+    pub element: Cow<'static, str>,
     /// `energy`, `force`, ….
     pub kind: &'static str,
     /// Documentation of the element.
-    pub docs: &'static str,
+    pub docs: Cow<'static, str>,
     /// Declaration of the element.
-    pub source: &'static str,
+    pub source: Cow<'static, str>,
     /// Number of inputs.
     pub inputs: usize,
     /// Number of inputs without differences, because a kink or the boundary of two regions is too near.
@@ -350,8 +352,8 @@ impl Report {
     }
 
     /// Returns the losses of digits near rest and near singularities, with their elements.
-    pub fn warnings(&self) -> impl Iterator<Item = (&'static str, &Warning)> {
-        self.sections.iter().flat_map(|section| section.warnings.iter().map(|warning| (section.element, warning)))
+    pub fn warnings(&self) -> impl Iterator<Item = (&str, &Warning)> {
+        self.sections.iter().flat_map(|section| section.warnings.iter().map(|warning| (&*section.element, warning)))
     }
 
     /// Returns the lines that failed.
@@ -360,10 +362,10 @@ impl Report {
     }
 
     /// Returns the planted faults that were missed, with their elements.
-    pub fn missed(&self) -> impl Iterator<Item = (&'static str, &Mutant)> {
+    pub fn missed(&self) -> impl Iterator<Item = (&str, &Mutant)> {
         self.sections.iter().flat_map(|section| {
             let mutants = section.mutations.iter().flat_map(|score| &score.mutants);
-            mutants.filter(|mutant| mutant.caught_by.is_empty()).map(|mutant| (section.element, mutant))
+            mutants.filter(|mutant| mutant.caught_by.is_empty()).map(|mutant| (&*section.element, mutant))
         })
     }
 
@@ -371,7 +373,7 @@ impl Report {
     #[must_use]
     pub fn elements(&self) -> usize {
         let mut names: Vec<&str> =
-            self.lines.iter().map(|l| l.element).chain(self.refused.iter().map(|(name, _)| name.as_str())).collect();
+            self.lines.iter().map(|l| &*l.element).chain(self.refused.iter().map(|(name, _)| name.as_str())).collect();
         names.sort_unstable();
         names.dedup();
         names.len()

@@ -1,3 +1,4 @@
+use std::borrow::Cow;
 use std::path::Path;
 
 use anyhow::Context;
@@ -69,7 +70,7 @@ impl Target {
     /// Returns the name of the element.
     #[must_use]
     pub fn name(&self) -> &str {
-        self.declaration().name
+        &self.declaration().name
     }
 
     /// Returns the operations of all routines, which the time of an audit grows with.
@@ -80,7 +81,7 @@ impl Target {
 
     /// Returns the declaration of the element.
     #[must_use]
-    pub fn declaration(&self) -> &'static Declaration {
+    pub fn declaration(&self) -> &Declaration {
         match &self.0 {
             Origin::Catalogue(entry) => entry.declaration,
             Origin::Text(element) => element.declaration(),
@@ -92,14 +93,14 @@ impl Target {
     /// # Errors
     /// If the declaration does not compile.
     pub fn subject(&self) -> Result<Subject, String> {
-        let declaration = self.declaration();
         match &self.0 {
             Origin::Catalogue(entry) => {
                 // A declaration's source includes the functions that it uses, so it compiles on its own.
-                let mut declared = Interpreted::from_source_within(declaration.source, &Budget::default().trusting())
-                    .map_err(|errors| errors.to_string())?;
+                let mut declared =
+                    Interpreted::from_source_within(&entry.declaration.source, &Budget::default().trusting())
+                        .map_err(|errors| errors.to_string())?;
                 let interpreted = declared.pop();
-                Subject::new(declaration, Box::new(entry.evaluate), interpreted)
+                Subject::new(Cow::Borrowed(entry.declaration), Box::new(entry.evaluate), interpreted)
             }
             Origin::Text(element) => Subject::of_routines(element, Some(element.as_ref().clone())),
         }
@@ -111,7 +112,7 @@ impl Target {
     /// If the declaration does not compile.
     pub fn subject_without_faults(&self) -> Result<Subject, String> {
         match &self.0 {
-            Origin::Catalogue(entry) => Subject::new(entry.declaration, Box::new(entry.evaluate), None),
+            Origin::Catalogue(entry) => Subject::new(Cow::Borrowed(entry.declaration), Box::new(entry.evaluate), None),
             Origin::Text(element) => Subject::of_routines(element, None),
         }
     }
@@ -120,7 +121,7 @@ impl Target {
 /// An element under audit.
 pub struct Subject {
     /// The declaration.
-    pub declaration: &'static Declaration,
+    pub declaration: Cow<'static, Declaration>,
     /// Evaluates all blocks of the element.
     pub evaluate: EvaluateAny,
     /// The textbook form.
@@ -139,12 +140,12 @@ impl Subject {
     /// # Errors
     /// If the source of the declaration does not compile.
     pub fn new(
-        declaration: &'static Declaration,
+        declaration: Cow<'static, Declaration>,
         evaluate: EvaluateAny,
         interpreted: Option<Interpreted>,
     ) -> Result<Self, String> {
-        let formula = Textbook::from_source(declaration.source).map_err(|errors| errors.to_string())?;
-        let meter = Meter::new(declaration);
+        let formula = Textbook::from_source(&declaration.source).map_err(|errors| errors.to_string())?;
+        let meter = Meter::new(&declaration);
         Ok(Self { declaration, evaluate, formula, interpreted, routines: None, meter })
     }
 
@@ -154,7 +155,8 @@ impl Subject {
     /// If the source of the declaration does not compile.
     pub fn of_routines(routines: &Interpreted, interpreted: Option<Interpreted>) -> Result<Self, String> {
         let runs = routines.clone();
-        let subject = Self::new(routines.declaration(), Box::new(move |inputs| runs.evaluate(inputs)), interpreted)?;
+        let declaration = Cow::Owned(Declaration::clone(routines.declaration()));
+        let subject = Self::new(declaration, Box::new(move |inputs| runs.evaluate(inputs)), interpreted)?;
         Ok(Self { routines: Some(routines.clone()), ..subject })
     }
 
@@ -186,7 +188,7 @@ impl Subject {
     /// # Errors
     /// If the rest shape is degenerate or a block has the wrong size.
     pub fn answer(&self, sample: &Sample) -> Result<Answer, NoAnswer> {
-        let answer = evaluate(self.declaration, &self.evaluate, &sample.inputs())?;
+        let answer = evaluate(&self.declaration, &self.evaluate, &sample.inputs())?;
         self.meter.answer(answer.flags.iter().filter(|flags| flags.degenerate).count());
         Ok(answer)
     }
@@ -215,8 +217,8 @@ impl Subject {
 
     /// Returns a sampler of the domain that the declaration states.
     #[must_use]
-    pub fn sampler(&self, seed: u64) -> Sampler {
-        Sampler::within(&self.formula.program().audit_scope, self.declaration, seed)
+    pub fn sampler(&self, seed: u64) -> Sampler<'_> {
+        Sampler::within(&self.formula.program().audit_scope, &self.declaration, seed)
     }
 
     /// Returns the samples that the declaration asks for, if it was read at run time.

@@ -75,7 +75,7 @@ pub fn worse(a: f64, b: f64) -> f64 {
 /// use verify::{BlockName, Sample, multiprecision::truth};
 ///
 /// let bend = energy_catalogue::find("HairBend").unwrap().declaration;
-/// let formula = Textbook::from_source(bend.source).unwrap();
+/// let formula = Textbook::from_source(&bend.source).unwrap();
 /// // A turn by 1e-8: 1 − cos has no digit left in doubles.
 /// let sample = Sample {
 ///     parameters: vec![2.0],

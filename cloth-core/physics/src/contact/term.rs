@@ -65,7 +65,7 @@ impl<S: Solid> TermDescription for ContactTerm<S> {
         &self.name
     }
 
-    fn declaration(&self) -> &'static Declaration {
+    fn declaration(&self) -> &Declaration {
         <S::Contact as Element>::DECLARATION
     }
 

@@ -125,8 +125,8 @@ impl Declared {
         let elements = self.read()?;
         let known: BTreeSet<String> = elements
             .iter()
-            .flat_map(|element| element.declaration().parameters)
-            .map(|parameter| canonical_name(parameter.name))
+            .flat_map(|element| &*element.declaration().parameters)
+            .map(|parameter| canonical_name(&parameter.name))
             .collect();
         if let Some(unused) = self.parameters.keys().find(|name| !known.contains(&canonical_name(name))) {
             let known = known.into_iter().collect();
@@ -141,13 +141,13 @@ impl Declared {
             .map_err(|source| DeclaredError::Unreadable { path: path(), source })?;
         let all = Interpreted::from_file(&text, &self.path.display().to_string())
             .map_err(|errors| DeclaredError::Text { diagnostics: errors.to_string() })?;
-        let known: Vec<String> = all.iter().map(|element| element.declaration().name.to_owned()).collect();
+        let known: Vec<String> = all.iter().map(|element| element.declaration().name.to_string()).collect();
         if known.is_empty() {
             return Err(DeclaredError::Empty { path: path() });
         }
         let Some(wanted) = &self.elements else { return Ok(all) };
         let find = |name: &String| {
-            let found = all.iter().find(|element| element.declaration().name == name).cloned();
+            let found = all.iter().find(|element| element.declaration().name == **name).cloned();
             found.ok_or_else(|| DeclaredError::NoSuchElement { path: path(), name: name.clone(), known: known.clone() })
         };
         wanted.iter().map(find).collect()
@@ -155,8 +155,11 @@ impl Declared {
 
     fn term(&self, element: Interpreted, target: &TargetMesh<'_>) -> Result<TapeTerm, DeclaredError> {
         let declaration = element.declaration();
-        let unfit =
-            |what: String| DeclaredError::Unfit { path: self.path.clone(), element: declaration.name.to_owned(), what };
+        let unfit = |what: String| DeclaredError::Unfit {
+            path: self.path.clone(),
+            element: declaration.name.to_string(),
+            what,
+        };
         if declaration.kind != Kind::Energy {
             return Err(unfit(format!("a {}", declaration.kind.keyword())));
         }
@@ -169,8 +172,8 @@ impl Declared {
         }
         let inputs = sites.iter().map(|site| self.inputs(declaration, site, target, &unfit));
         let inputs: Vec<(Vec<f64>, Vec<f64>)> = inputs.collect::<Result<_, _>>()?;
-        let parameters = columns(declaration.parameters, inputs.iter().map(|(parameters, _)| &parameters[..]));
-        let rest = columns(declaration.rest, inputs.iter().map(|(_, rest)| &rest[..]));
+        let parameters = columns(&declaration.parameters, inputs.iter().map(|(parameters, _)| &parameters[..]));
+        let rest = columns(&declaration.rest, inputs.iter().map(|(_, rest)| &rest[..]));
         let [rest, parameters] =
             [&rest, &parameters].map(|all| all.iter().map(|c| Column::Each(c)).collect::<Vec<_>>());
         let elements = element.elements(sites.len(), &rest, &parameters).map_err(|error| match error {
@@ -195,12 +198,12 @@ impl Declared {
         let given: BTreeMap<String, f64> =
             self.parameters.iter().map(|(name, value)| (canonical_name(name), *value)).collect();
         let parameter = |field: &Field| {
-            let name = canonical_name(field.name);
+            let name = canonical_name(&field.name);
             let value = given.get(&name).copied().or_else(|| site.default_of(&name)).filter(|_| field.size == 1);
             value.ok_or_else(|| DeclaredError::Missing {
                 path: self.path.clone(),
-                element: declaration.name.to_owned(),
-                parameter: field.name.to_owned(),
+                element: declaration.name.to_string(),
+                parameter: field.name.to_string(),
                 unit: if field.unit.is_empty() { String::new() } else { format!(" [{}]", field.unit) },
             })
         };

@@ -208,12 +208,12 @@ impl<'a> Builder<'a> {
 
     /// Adds a term to an island. Reuses a matching label among those from index `since` on.
     fn add_term(&mut self, island: usize, since: usize, term: Box<dyn Term>) {
-        let (name, element) = (term.name(), term.declaration().name);
+        let (name, element) = (term.name(), &*term.declaration().name);
         let labels = &mut self.model.labels;
         let known = labels[since..].iter().position(|label| label.name == name && label.element == element);
         let label = known.map_or(labels.len(), |at| since + at);
         if label == labels.len() {
-            labels.push(TermLabel { name: name.to_owned(), element });
+            labels.push(TermLabel { name: name.to_owned(), element: element.to_owned() });
         }
         let island = &mut self.model.islands[island];
         island.labels.push(label);

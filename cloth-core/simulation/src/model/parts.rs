@@ -77,7 +77,7 @@ pub struct TermLabel {
     /// The term's name.
     pub name: String,
     /// The name of its declared element.
-    pub element: &'static str,
+    pub element: String,
 }
 
 /// A scene ready to be simulated.
@@ -191,7 +191,7 @@ impl Model {
 
     /// Adds a term to an island, with a label of its own, or that of terms with its name and element.
     pub(crate) fn add_term(&mut self, island: usize, term: Box<dyn Term>) {
-        let label = TermLabel { name: term.name().to_owned(), element: term.declaration().name };
+        let label = TermLabel { name: term.name().to_owned(), element: term.declaration().name.to_string() };
         let known = self.labels.iter().position(|known| *known == label);
         let number = known.unwrap_or(self.labels.len());
         if known.is_none() {

@@ -79,7 +79,7 @@ impl TermDescription for SoftPinTerm {
         &self.name
     }
 
-    fn declaration(&self) -> &'static Declaration {
+    fn declaration(&self) -> &Declaration {
         <ZeroLengthSpring as Element>::DECLARATION
     }
 

@@ -23,7 +23,7 @@ use energy_solve::{Counts, EvaluationError, PlacedTerm, SystemError, index};
 
 pub use deformed::MostDeformed;
 pub use island::{Island, SavedIsland};
-pub use open::{ControlError, Controls, LabelledForces, OwnForce, Snapshot};
+pub use open::{ControlError, Controls, LabelledForces, OwnElements, OwnForce, Snapshot};
 pub use saved::{RestoreError, SavedCounts, SavedState};
 pub use summary::{Summary, TermSummary};
 pub use totals::Totals;

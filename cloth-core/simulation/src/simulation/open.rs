@@ -23,18 +23,25 @@ pub type LabelledForces = (String, Vec<Vector3<f64>>);
 
 /// A force or an energy that a program adds to a scene.
 pub trait OwnForce: Send + Sync {
-    /// Name in the ledger and in messages.
-    fn name(&self) -> String;
-    /// Vertices of one element.
-    fn points(&self) -> usize;
-    /// The vertices of one element after the other, numbered through the scene.
-    fn vertices(&self) -> &[usize];
+    /// The elements of the scene that the force acts on.
+    fn elements(&self) -> &OwnElements;
     /// Whether all elements must be in one term, because a function evaluates them together.
     fn is_whole(&self) -> bool {
         false
     }
     /// Creates the term of some of the elements, by their numbers. `vertices` are theirs, numbered within an island.
     fn term(&self, elements: &[usize], vertices: Vec<u32>) -> Box<dyn Term>;
+}
+
+/// The elements of an [`OwnForce`].
+#[derive(Clone, Debug)]
+pub struct OwnElements {
+    /// Name of the force in the ledger and in messages.
+    pub name: String,
+    /// Vertices of one element.
+    pub points: usize,
+    /// The vertices of one element after the other, numbered through the scene.
+    pub vertices: Vec<usize>,
 }
 
 /// What a program controls in a simulation.
@@ -445,20 +452,25 @@ fn add_force(model: &mut Model, force: &dyn OwnForce) -> Result<(), ControlError
         places.for_each(|(place, &vertex)| homes[vertex] = (number, energy_solve::index(place)));
     }
     let mut parts: BTreeMap<usize, (Vec<usize>, Vec<u32>)> = BTreeMap::new();
-    for (element, stencil) in force.vertices().chunks_exact(force.points()).enumerate() {
+    for (element, stencil) in force.elements().vertices.chunks_exact(force.elements().points).enumerate() {
         if let Some(&vertex) = stencil.iter().find(|&&vertex| vertex >= homes.len()) {
             return Err(ControlError::NoSuchVertex { vertex, vertices: homes.len() });
         }
         let home = homes[stencil[0]].0;
         if let Some(&second) = stencil.iter().find(|&&vertex| homes[vertex].0 != home) {
-            return Err(ControlError::Apart { name: force.name(), element, first: stencil[0], second });
+            return Err(ControlError::Apart {
+                name: force.elements().name.clone(),
+                element,
+                first: stencil[0],
+                second,
+            });
         }
         let (elements, vertices) = parts.entry(home).or_default();
         elements.push(element);
         vertices.extend(stencil.iter().map(|&vertex| homes[vertex].1));
     }
     if force.is_whole() && parts.len() > 1 {
-        return Err(ControlError::Divided { name: force.name() });
+        return Err(ControlError::Divided { name: force.elements().name.clone() });
     }
     for (island, (elements, vertices)) in parts {
         model.add_term(island, force.term(&elements, vertices));

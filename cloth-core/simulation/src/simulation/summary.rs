@@ -190,8 +190,8 @@ impl Simulation {
         // Starting at 0 turns −0, the sum of no pairs, into 0.
         let energy = energies.iter().fold(0.0, |sum, energy| sum + energy);
         let named = [
-            ("contact", <DistanceBarrier as Element>::DECLARATION.name, Some(energy)),
-            ("friction of contact", <SlidingFriction as Element>::DECLARATION.name, None),
+            ("contact", &*<DistanceBarrier as Element>::DECLARATION.name, Some(energy)),
+            ("friction of contact", &*<SlidingFriction as Element>::DECLARATION.name, None),
         ];
         let term = |(name, element, energy): (&str, &str, Option<f64>)| {
             let (name, element) = (name.to_owned(), element.to_owned());

@@ -1,5 +1,5 @@
 use proc_macro2::TokenStream;
-use quote::{format_ident, quote};
+use quote::{ToTokens, format_ident, quote};
 
 use crate::check::{Input, Program};
 use crate::graph::NodeId;
@@ -26,7 +26,7 @@ pub(super) fn declaration(program: &Program, routines: &Routines) -> TokenStream
     let Character { curved, quadratic, velocity_dependent, symmetric } = character(program, routines);
     let vectors = routines.vectors.iter().map(|vector| {
         let ends = vector.iter().map(|(point, sign)| quote!((#point, #sign)));
-        quote!(&[#(#ends),*])
+        borrowed(quote!(&[#(#ends),*]))
     });
     let dihedral = match routines.dihedral {
         Some(points) => quote!(::core::option::Option::Some([#(#points),*])),
@@ -35,30 +35,36 @@ pub(super) fn declaration(program: &Program, routines: &Routines) -> TokenStream
     let primitives = &routines.primitives;
     let properties = program.properties.iter().map(|(property, _)| format_ident!("{property:?}"));
     let list = routines.list.iter().map(|r| routine(routines, r));
-    quote! {
+    let [name, docs, formula, source] = [name, &docs, formula, source].map(borrowed);
+    let [points, rest, parameters] = [points, rest, parameters].map(|fields| borrowed(quote!(&[#fields])));
+    let properties = borrowed(quote!(&[#(::energy_dsl::Property::#properties),*]));
+    let [vectors, primitives, list] =
+        [quote!(&[#(#vectors),*]), quote!(&[#(#primitives),*]), quote!(&[#(#list),*])].map(borrowed);
+    quote! {{
+        use ::std::borrow::Cow::Borrowed;
         ::energy_dsl::Declaration {
             name: #name,
             kind: ::energy_dsl::Kind::#kind,
             docs: #docs,
             formula: #formula,
             source: #source,
-            points: &[#points],
-            rest: &[#rest],
-            parameters: &[#parameters],
+            points: #points,
+            rest: #rest,
+            parameters: #parameters,
             rows: #rows,
-            properties: &[#(::energy_dsl::Property::#properties),*],
+            properties: #properties,
             translation_invariant: #invariant,
             curved: #curved,
             quadratic: #quadratic,
             velocity_dependent: #velocity_dependent,
             symmetric: #symmetric,
             reduced_coordinates: #coordinates,
-            reduced_vectors: &[#(#vectors),*],
+            reduced_vectors: #vectors,
             dihedral: #dihedral,
-            primitives: &[#(#primitives),*],
-            routines: &[#(#list),*],
+            primitives: #primitives,
+            routines: #list,
         }
-    }
+    }}
 }
 
 /// Properties that solvers rely on.
@@ -93,11 +99,17 @@ pub(crate) fn character(program: &Program, routines: &Routines) -> Character {
     }
 }
 
+/// Writes a constant that a description borrows.
+fn borrowed(constant: impl ToTokens) -> TokenStream {
+    quote!(Borrowed(#constant))
+}
+
 fn fields(inputs: &[Input]) -> TokenStream {
     inputs
         .iter()
         .map(|input| {
             let (name, size, unit) = (&input.name, input.input_type.size(), &input.unit);
+            let [name, unit] = [name, unit].map(borrowed);
             quote!(::energy_dsl::Field { name: #name, size: #size, unit: #unit },)
         })
         .collect()

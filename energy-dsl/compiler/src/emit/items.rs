@@ -148,7 +148,7 @@ fn constructor(name: &Ident, program: &Program, routines: &Routines) -> TokenStr
                         sound = sound & (value - value).equal(T::from_f64(0.0));
                     }
                     if ::energy_dsl::Mask::any(!sound) {
-                        return Err(::energy_dsl::RestError { element: #element });
+                        return Err(::energy_dsl::RestError { element: ::std::borrow::Cow::Borrowed(#element) });
                     }
                     Ok(#name { #(#fields,)* precomputed })
                 }

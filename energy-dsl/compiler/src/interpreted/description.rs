@@ -1,66 +1,52 @@
 //! The self-description of an element that is read at run time.
 
-use std::collections::BTreeMap;
-use std::sync::{Mutex, PoisonError};
+use std::borrow::Cow;
 
 use crate::check::{Input, Program};
 use crate::emit::{Character, character};
 use crate::routines::Routines;
 use energy_runtime::{Declaration, Field, Kind, Routine};
 
-/// Descriptions so far, by their text.
-static KNOWN: Mutex<BTreeMap<String, &'static Declaration>> = Mutex::new(BTreeMap::new());
-
-/// Returns the self-description that generated code would have. Like that, it lives until the program ends; equal
-/// declarations share one.
-pub(super) fn description(program: &Program, routines: &Routines) -> &'static Declaration {
-    let Program { name, docs, source, formula, properties, .. } = program;
-    let properties: Vec<_> = properties.iter().map(|(property, _)| property).collect();
-    let key = format!("{name}\n{docs:?}\n{source}\n{formula}\n{properties:?}");
-    let mut known = KNOWN.lock().unwrap_or_else(PoisonError::into_inner);
-    known.entry(key).or_insert_with(|| Box::leak(Box::new(describe(program, routines))))
-}
-
-fn describe(program: &Program, routines: &Routines) -> Declaration {
+/// Returns the self-description that generated code would have. It owns its texts and lists.
+pub(super) fn description(program: &Program, routines: &Routines) -> Declaration {
     let implied = if program.kind == Kind::Constraint { 2 } else { 0 };
     let declared = &program.parameters[..program.parameters.len() - implied];
     let docs: Vec<&str> = program.docs.iter().map(|line| line.strip_prefix(' ').unwrap_or(line)).collect();
     let Character { curved, quadratic, velocity_dependent, symmetric } = character(program, routines);
-    let vectors = routines.vectors.iter().map(|vector| &*vector.clone().leak()).collect::<Vec<_>>();
     let list = routines.list.iter().map(|routine| Routine {
         name: routine.name,
         reduced: routines.count(&routine.reduced_outputs()),
         full: routines.count(&routine.outputs()),
     });
     Declaration {
-        name: program.name.clone().leak(),
+        name: Cow::Owned(program.name.clone()),
         kind: program.kind,
-        docs: docs.join("\n").leak(),
-        formula: program.formula.clone().leak(),
-        source: program.source.clone().leak(),
+        docs: Cow::Owned(docs.join("\n")),
+        formula: Cow::Owned(program.formula.clone()),
+        source: Cow::Owned(program.source.clone()),
         points: fields(&program.moving),
         rest: fields(&program.rest),
         parameters: fields(declared),
         rows: program.rows(),
-        properties: program.properties.iter().map(|(property, _)| *property).collect::<Vec<_>>().leak(),
+        properties: program.properties.iter().map(|(property, _)| *property).collect(),
         translation_invariant: routines.translation_invariant,
         curved,
         quadratic,
         velocity_dependent,
         symmetric,
         reduced_coordinates: routines.coordinates,
-        reduced_vectors: vectors.leak(),
+        reduced_vectors: routines.vectors.iter().map(|vector| Cow::Owned(vector.clone())).collect(),
         dihedral: routines.dihedral,
-        primitives: routines.primitives.clone().leak(),
-        routines: list.collect::<Vec<_>>().leak(),
+        primitives: Cow::Owned(routines.primitives.clone()),
+        routines: list.collect(),
     }
 }
 
-fn fields(inputs: &[Input]) -> &'static [Field] {
+fn fields(inputs: &[Input]) -> Cow<'static, [Field]> {
     let field = |input: &Input| Field {
-        name: input.name.clone().leak(),
+        name: Cow::Owned(input.name.clone()),
         size: input.input_type.size(),
-        unit: input.unit.clone().leak(),
+        unit: Cow::Owned(input.unit.clone()),
     };
-    inputs.iter().map(field).collect::<Vec<_>>().leak()
+    inputs.iter().map(field).collect()
 }

@@ -2,6 +2,7 @@
 
 use std::fmt;
 use std::ops::Range;
+use std::sync::Arc;
 
 use super::{Interpreted, Layouts};
 use energy_runtime::tape::{Output, Places, TapeElements};
@@ -24,7 +25,7 @@ pub enum EvaluateError {
     /// Declarations of this kind do not have the routine.
     Routine {
         /// The declaration.
-        declaration: &'static Declaration,
+        declaration: Arc<Declaration>,
         /// The routine.
         routine: &'static str,
     },
@@ -39,7 +40,7 @@ impl fmt::Display for EvaluateError {
                 // Hessians are computed in reduced coordinates; callers ask for `hessian`.
                 let asked = |name: &'static str| if name == "reduced_hessian" { "hessian" } else { name };
                 let names: Vec<&str> = declaration.routines.iter().map(|routine| asked(routine.name)).collect();
-                let (name, kind) = (declaration.name, declaration.kind.keyword());
+                let (name, kind) = (&declaration.name, declaration.kind.keyword());
                 write!(f, "{name}: no `{routine}` of this {kind}; it has {}", names.join(", "))
             }
             Self::Batch(error) => write!(f, "{error}"),
@@ -226,7 +227,7 @@ impl<S: Float> Elements<S> {
     ) -> Result<Flagged, EvaluateError> {
         let routines = self.tape.routines();
         if routines.find(routine).is_none() && !(routine == "hessian" && routines.expansion.is_some()) {
-            return Err(EvaluateError::Routine { declaration: self.element.declaration, routine });
+            return Err(EvaluateError::Routine { declaration: Arc::clone(&self.element.declaration), routine });
         }
         Ok(self.tape.evaluate(routine, range, Places::Rows(x), v.map(Places::Rows), outputs)?)
     }

@@ -65,7 +65,7 @@ pub enum BindError {
     /// More or fewer columns than inputs.
     Columns {
         /// The element.
-        element: &'static str,
+        element: String,
         /// Whether the columns are those of the rest shape; else of parameters.
         rest: bool,
         /// Names of the inputs that need a column.
@@ -76,7 +76,7 @@ pub enum BindError {
     /// A column of another length than its input needs.
     Length {
         /// The element.
-        element: &'static str,
+        element: String,
         /// Name of the input.
         input: String,
         /// Numbers that all elements need.
@@ -138,11 +138,16 @@ impl Interpreted {
         count: usize,
         given: &[Column<'a, S>],
     ) -> Result<Vec<(Column<'a, S>, usize)>, BindError> {
-        let element = self.declaration.name;
+        let element = || self.declaration.name.to_string();
         let inputs: Vec<&InputNumbers> = self.inputs.iter().filter(|input| input.kind == kind).collect();
         if inputs.len() != given.len() {
             let needed = inputs.iter().map(|input| input.name.clone()).collect();
-            return Err(BindError::Columns { element, rest: kind == InputKind::Rest, needed, given: given.len() });
+            return Err(BindError::Columns {
+                element: element(),
+                rest: kind == InputKind::Rest,
+                needed,
+                given: given.len(),
+            });
         }
         let sized = |(input, &column): (&&InputNumbers, &Column<'a, S>)| {
             let (needed, given) = match column {
@@ -152,7 +157,7 @@ impl Interpreted {
             if needed == given {
                 Ok((column, input.size()))
             } else {
-                Err(BindError::Length { element, input: input.name.clone(), needed, given })
+                Err(BindError::Length { element: element(), input: input.name.clone(), needed, given })
             }
         };
         inputs.iter().zip(given).map(sized).collect()

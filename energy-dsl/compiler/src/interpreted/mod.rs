@@ -54,7 +54,7 @@ pub use layouts::Layouts;
 /// ```
 #[derive(Clone, Debug)]
 pub struct Interpreted {
-    declaration: &'static Declaration,
+    declaration: Arc<Declaration>,
     inputs: Arc<Vec<InputNumbers>>,
     code: Arc<ElementCode>,
     routines: Arc<tape::Routines>,
@@ -63,9 +63,9 @@ pub struct Interpreted {
 }
 
 impl Interpreted {
-    /// Compiles the declarations of a text.
+    /// Compiles the declarations of a text, whose strings are those of Rust.
     ///
-    /// Their descriptions live until the program ends, as those of generated elements do; equal declarations share one.
+    /// The tokens of Rust keep a copy of the text until the thread ends. [`Self::from_file`] keeps none.
     ///
     /// # Errors
     /// Whatever is wrong with the text.
@@ -126,13 +126,13 @@ impl Interpreted {
 
     fn new(program: &Program, routines: &Routines) -> Result<Self, TooLarge> {
         let declaration = description(program, routines);
-        let code = ElementCode::new(declaration.name, program, routines);
+        let code = ElementCode::new(program, routines);
         Ok(Self {
-            declaration,
             inputs: Arc::new(InputNumbers::of(program)),
             routines: Arc::new(code.record()?),
             code: Arc::new(code),
-            layouts: Arc::new(Layouts::of(declaration)),
+            layouts: Arc::new(Layouts::of(&declaration)),
+            declaration: Arc::new(declaration),
             audit_samples: program.audit_samples,
         })
     }
@@ -143,10 +143,11 @@ impl Interpreted {
         self.audit_samples
     }
 
-    /// Returns the declaration: name, kind, formula, documentation, units, number of reduced coordinates.
+    /// Returns the declaration: name, kind, formula, documentation, units, number of reduced coordinates. Whoever
+    /// outlives the element shares it.
     #[must_use]
-    pub fn declaration(&self) -> &'static Declaration {
-        self.declaration
+    pub fn declaration(&self) -> &Arc<Declaration> {
+        &self.declaration
     }
 
     /// Returns all inputs in declared order: points or unknowns, rest shape, parameters. Stiffness `ks` and damping

@@ -100,7 +100,7 @@ impl Interpreted {
         // False for infinite numbers and NaN.
         let sound = |x: &T| (x.clone() - x.clone()).equal(T::from_f64(0.0)).all();
         if flags.degenerate.any() || !numbers.iter().all(sound) {
-            return Err(RestError { element: self.declaration.name });
+            return Err(RestError { element: self.declaration.name.clone() });
         }
         Ok(numbers)
     }

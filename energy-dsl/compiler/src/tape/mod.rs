@@ -142,7 +142,7 @@ fn inputs_of(code: &Code) -> Vec<Input> {
 /// The statements of an element.
 #[derive(Clone, Debug)]
 pub(crate) struct ElementCode {
-    name: &'static str,
+    name: String,
     coordinates: usize,
     parameters: usize,
     shape: usize,
@@ -153,7 +153,7 @@ pub(crate) struct ElementCode {
 }
 
 impl ElementCode {
-    pub(crate) fn new(name: &'static str, program: &Program, routines: &Routines) -> Self {
+    pub(crate) fn new(program: &Program, routines: &Routines) -> Self {
         // The full Hessian is expanded from the reduced one.
         let has_expansion = matches!(program.kind, Kind::Energy | Kind::Constraint);
         let wanted = |routine: &&routines::Routine| !(has_expansion && routine.name == "hessian");
@@ -162,7 +162,7 @@ impl ElementCode {
             Code::new(&expansion.graph, &[expansion.gradient.clone(), expansion.triangle.clone()], [None, None])
         });
         Self {
-            name,
+            name: program.name.clone(),
             coordinates: program.moving_size(),
             parameters: program.parameters_size(),
             shape: program.rest.iter().map(|input| input.input_type.size()).sum(),
@@ -185,7 +185,7 @@ impl ElementCode {
             _ => None,
         };
         Ok(tape::Routines {
-            name: self.name,
+            name: self.name.clone(),
             coordinates: self.coordinates,
             parameters: self.parameters,
             shape: self.shape,

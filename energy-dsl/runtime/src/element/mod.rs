@@ -10,6 +10,8 @@
 
 mod call;
 
+use std::borrow::Cow;
+
 use crate::array::Array;
 use crate::declaration::Declaration;
 use crate::numbers::Flags;
@@ -40,10 +42,10 @@ pub const fn triangle_index(points: usize, i: usize, j: usize) -> usize {
 }
 
 /// The rest shape is degenerate: no element can be made from it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct RestError {
     /// Name of the element.
-    pub element: &'static str,
+    pub element: Cow<'static, str>,
 }
 
 impl std::fmt::Display for RestError {

@@ -220,7 +220,7 @@ impl<S: Float> Stored<S> {
                 let stored = &mut numbers[(first + element) * size..][..size];
                 stored.iter_mut().enumerate().for_each(|(number, stored)| *stored = results.number(number)[element]);
                 if slots.flags[0] >> element & 1 == 1 || !stored.iter().all(Number::is_representable) {
-                    return Err((first + element, RestError { element: routines.name }));
+                    return Err((first + element, RestError { element: routines.name.clone().into() }));
                 }
             }
         }

@@ -182,7 +182,7 @@ fn flags<T: Number>(values: &Values<T>, slots: [Option<u16>; 2]) -> Flags<T> {
 #[derive(Clone, Debug)]
 pub struct Routines {
     /// Name of the element.
-    pub name: &'static str,
+    pub name: String,
     /// Coordinates of the points, or unknowns of a residual. They are the first inputs of every routine but `rest`;
     /// velocities follow, if the routine reads any.
     pub coordinates: usize,

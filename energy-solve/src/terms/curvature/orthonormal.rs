@@ -23,7 +23,7 @@ impl Orthonormal {
     /// Creates the transformation for a declaration. `None` if there are too many difference vectors, or they are
     /// linearly dependent.
     pub(crate) fn new(declaration: &Declaration) -> Option<Self> {
-        let vectors = declaration.reduced_vectors;
+        let vectors = &*declaration.reduced_vectors;
         if vectors.is_empty() || vectors.len() > VECTORS || declaration.reduced_coordinates != 3 * vectors.len() {
             return None;
         }
@@ -37,7 +37,7 @@ impl Orthonormal {
         for i in 0..n {
             for j in 0..=i {
                 let known: f64 = (0..j).map(|k| lower[i][k] * lower[j][k]).sum();
-                let rest = dot(vectors[i], vectors[j]) - known;
+                let rest = dot(&vectors[i], &vectors[j]) - known;
                 if i == j && rest < 1e-9 {
                     return None;
                 }

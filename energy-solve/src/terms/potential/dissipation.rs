@@ -18,7 +18,7 @@ use crate::terms::restriction::Restriction;
 use crate::terms::share::{Divisible, Share};
 use crate::terms::state::{State, StepStart};
 use crate::terms::stencils::Stencils;
-use crate::terms::term::{Character, PlacedTerm, Quantity, Term, TermDescription};
+use crate::terms::term::{Character, MadeFromTerm, PlacedTerm, Quantity, Term, TermDescription};
 
 /// Selects the elements that act during a step. Their parameters are fixed at its start; only velocities vary.
 pub trait DissipationLaw: Debug + Send + Sync {
@@ -55,7 +55,7 @@ impl<L: DissipationLaw> TermDescription for DissipationTerm<L> {
         &self.on.name
     }
 
-    fn declaration(&self) -> &'static Declaration {
+    fn declaration(&self) -> &Declaration {
         <L::Element as Element>::DECLARATION
     }
 
@@ -137,21 +137,9 @@ fn in_velocity_weights<'a>(sum: &'a mut Linearisation<'_>) -> Linearisation<'a> 
     }
 }
 
-impl<L: DissipationLaw> TermDescription for PlacedDissipationTerm<L> {
-    fn name(&self) -> &str {
-        self.term.name()
-    }
-
-    fn declaration(&self) -> &'static Declaration {
-        self.term.declaration()
-    }
-
-    fn character(&self) -> Character {
-        CHARACTER
-    }
-
-    fn stencils(&self) -> Stencils<'_> {
-        self.term.stencils()
+impl<L: DissipationLaw> MadeFromTerm for PlacedDissipationTerm<L> {
+    fn term(&self) -> &dyn TermDescription {
+        &*self.term
     }
 }
 

@@ -17,7 +17,7 @@ pub(super) trait Evaluated: Debug + Send + Sync + 'static {
     const PACK: usize;
 
     /// Returns the declaration of the elements.
-    fn declaration(&self) -> &'static Declaration;
+    fn declaration(&self) -> &Declaration;
     /// Returns the vertices of all elements by pack, point, element.
     fn stencils(&self) -> &[u32];
     /// Returns the elements with these indices.
@@ -35,7 +35,7 @@ pub(super) trait Evaluated: Debug + Send + Sync + 'static {
 impl<E: PackedPotential<f64> + Debug + Send + Sync + 'static> Evaluated for Packed<E> {
     const PACK: usize = BLOCK;
 
-    fn declaration(&self) -> &'static Declaration {
+    fn declaration(&self) -> &Declaration {
         E::DECLARATION
     }
 

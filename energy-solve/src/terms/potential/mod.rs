@@ -1,5 +1,6 @@
 //! Terms with f = −∇U.
 
+mod changing;
 mod dissipation;
 mod driven;
 mod evaluated;
@@ -11,6 +12,7 @@ mod tapes;
 mod work;
 
 use std::fmt::Debug;
+use std::sync::Arc;
 
 use energy_dsl::tape::TapeElements;
 use energy_dsl::{Declaration, Packed, PackedPotential};
@@ -50,7 +52,7 @@ impl<E: PackedPotential<f64> + Debug + Send + Sync> TermDescription for Potentia
         self.list.name()
     }
 
-    fn declaration(&self) -> &'static Declaration {
+    fn declaration(&self) -> &Declaration {
         E::DECLARATION
     }
 
@@ -81,7 +83,7 @@ impl<E: PackedPotential<f64> + Debug + Send + Sync + 'static> Term for Potential
 #[derive(Clone, Debug)]
 pub struct TapeTerm {
     name: String,
-    declaration: &'static Declaration,
+    declaration: Arc<Declaration>,
     elements: TapeElements,
     vertices: Vec<u32>,
 }
@@ -95,14 +97,14 @@ impl TapeTerm {
     #[must_use]
     pub fn new(
         name: String,
-        declaration: &'static Declaration,
+        declaration: &Arc<Declaration>,
         elements: TapeElements,
         vertices: impl IntoIterator<Item = usize>,
     ) -> Self {
         let vertices: Vec<u32> = vertices.into_iter().map(index).collect();
         assert!(elements.routines().expansion.is_some(), "{name}: {} is no energy", declaration.name);
         assert_eq!(vertices.len(), elements.len() * declaration.points.len(), "{name}: every element needs a stencil");
-        Self { name, declaration, elements, vertices }
+        Self { name, declaration: Arc::clone(declaration), elements, vertices }
     }
 }
 
@@ -111,12 +113,12 @@ impl TermDescription for TapeTerm {
         &self.name
     }
 
-    fn declaration(&self) -> &'static Declaration {
-        self.declaration
+    fn declaration(&self) -> &Declaration {
+        &self.declaration
     }
 
     fn character(&self) -> Character {
-        character(self.declaration)
+        character(&self.declaration)
     }
 
     fn stencils(&self) -> Stencils<'_> {
@@ -128,12 +130,7 @@ impl Term for TapeTerm {
     fn place(self: Box<Self>, dofs: &DofMap, pattern: &Pattern) -> Box<dyn PlacedTerm> {
         let stencils = self.stencils();
         let active = Active::new(stencils, dofs);
-        let vertex = |number: usize, point: usize| stencils.vertex(active.element(number), point);
-        let elements = match active.is_all() {
-            true => self.elements.clone(),
-            false => self.elements.selected(&active.iter().collect::<Vec<_>>()),
-        };
-        let packed = TapePacks::new(self.declaration, elements, vertex);
+        let packed = TapePacks::of_active(&self.declaration, self.elements.clone(), stencils, &active);
         let Self { name, elements, vertices, .. } = *self;
         Box::new(PlacedPotentialTerm::new(name, (elements.len(), vertices), (active, packed), dofs, pattern))
     }

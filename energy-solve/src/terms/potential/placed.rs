@@ -73,16 +73,17 @@ impl<E: Evaluated> PlacedPotentialTerm<E> {
         places: BlockPlaces,
     ) -> Self {
         let declaration = packed.declaration();
+        let (arity, orthonormal) = (declaration.points.len(), Orthonormal::new(declaration));
         Self {
             name,
-            arity: declaration.points.len(),
+            arity,
             count,
             vertices,
             energies: (0..active.len().div_ceil(BLOCK)).map(|_| AtomicU64::default()).collect(),
             active,
             packed,
             places,
-            orthonormal: Orthonormal::new(declaration),
+            orthonormal,
             shares: Vec::new(),
         }
     }
@@ -200,7 +201,7 @@ impl<E: Evaluated> TermDescription for PlacedPotentialTerm<E> {
         &self.name
     }
 
-    fn declaration(&self) -> &'static Declaration {
+    fn declaration(&self) -> &Declaration {
         self.packed.declaration()
     }
 

@@ -1,18 +1,21 @@
 //! Elements that were read at run time.
 
 use std::ops::Range;
+use std::sync::Arc;
 
 use energy_dsl::tape::{BlockResults, Expander, Places, Results, Slot, TAPE_BLOCK, TapeElements, stencil_blocks};
 use energy_dsl::{Declaration, Kernel, Lane, Level, Vector3, dispatch};
 
 use super::evaluated::Evaluated;
 use super::work::{Expanded, Gradients, Hessians, Values};
+use crate::terms::active::Active;
 use crate::terms::scatter::Lanes;
+use crate::terms::stencils::Stencils;
 
 /// Elements as tapes, with their vertices.
 #[derive(Debug)]
 pub(super) struct TapePacks {
-    declaration: &'static Declaration,
+    declaration: Arc<Declaration>,
     elements: TapeElements,
     /// Indexed by block, point, element.
     stencils: Vec<u32>,
@@ -23,13 +26,25 @@ pub(super) struct TapePacks {
 impl TapePacks {
     /// Packs elements; point p of element i is `vertex(i, p)`.
     pub(super) fn new(
-        declaration: &'static Declaration,
+        declaration: Arc<Declaration>,
         elements: TapeElements,
         vertex: impl Fn(usize, usize) -> u32,
     ) -> Self {
         let stencils = stencil_blocks(elements.len(), declaration.points.len(), vertex);
         let reduced = elements.routines().find("reduced_hessian").map_or(0, |r| r.groups.iter().map(Vec::len).sum());
         Self { declaration, elements, stencils, identity: (0..=u16::MAX).take(reduced).collect() }
+    }
+
+    /// Packs the active ones of all elements, whose vertices are `stencils`.
+    pub(super) fn of_active(
+        declaration: &Arc<Declaration>,
+        elements: TapeElements,
+        stencils: Stencils<'_>,
+        active: &Active,
+    ) -> Self {
+        let vertex = |number: usize, point: usize| stencils.vertex(active.element(number), point);
+        let elements = if active.is_all() { elements } else { elements.selected(&active.iter().collect::<Vec<_>>()) };
+        Self::new(Arc::clone(declaration), elements, vertex)
     }
 
     /// Calls `work` with the results of a routine and the vertices of each block.
@@ -52,8 +67,8 @@ impl TapePacks {
 impl Evaluated for TapePacks {
     const PACK: usize = TAPE_BLOCK;
 
-    fn declaration(&self) -> &'static Declaration {
-        self.declaration
+    fn declaration(&self) -> &Declaration {
+        &self.declaration
     }
 
     fn stencils(&self) -> &[u32] {
@@ -66,7 +81,7 @@ impl Evaluated for TapePacks {
             let element = indices[number];
             self.stencils[(element / TAPE_BLOCK * points + point) * TAPE_BLOCK + element % TAPE_BLOCK]
         };
-        Self::new(self.declaration, self.elements.selected(indices), vertex)
+        Self::new(Arc::clone(&self.declaration), self.elements.selected(indices), vertex)
     }
 
     fn values(&self, packs: &[Range<usize>], x: &[Vector3<f64>], work: &mut Values<'_>) {
@@ -92,7 +107,7 @@ impl Evaluated for TapePacks {
                     *slot = *results.number(number);
                 }
                 let block = (first, count);
-                let (declaration, reduced) = (self.declaration, &mut reduced[..]);
+                let (declaration, reduced) = (&*self.declaration, &mut reduced[..]);
                 dispatch(Project { declaration, block, stencils, reduced, x, projected: &mut projected, work });
                 Results::new(&reduced[..], &self.identity)
             } else {
@@ -185,7 +200,7 @@ impl Kernel for AddGradients<'_, '_> {
 
 /// Makes the reduced Hessians of a block positive semi-definite.
 struct Project<'a, 'w, 'b> {
-    declaration: &'static Declaration,
+    declaration: &'a Declaration,
     /// Index of the first element, and number of elements.
     block: (usize, usize),
     stencils: &'a [u32],

@@ -242,8 +242,8 @@ fn hinge_vectors<L: Level>([x1, x2, x3, x4]: [usize; 4], points: &[Vector3<L::F6
 #[inline(always)]
 fn difference_vectors<L: Level>(declaration: &Declaration, points: &[Vector3<L::F64>]) -> [Vector3<L::F64>; 2] {
     let mut vectors = [[L::F64::splat(0.0); 3]; 2];
-    for (vector, terms) in vectors.iter_mut().zip(declaration.reduced_vectors) {
-        for &(point, added) in *terms {
+    for (vector, terms) in vectors.iter_mut().zip(&*declaration.reduced_vectors) {
+        for &(point, added) in &**terms {
             for axis in 0..3 {
                 let part = points[point][axis];
                 vector[axis] = if added { vector[axis] + part } else { vector[axis] - part };

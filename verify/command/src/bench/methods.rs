@@ -32,7 +32,7 @@ const MANY: usize = 1024;
 #[derive(Clone, Debug, Serialize)]
 pub struct Measured {
     /// Name of the element.
-    pub element: &'static str,
+    pub element: String,
     /// Name of the method.
     pub method: &'static str,
     /// Nanoseconds per Hessian.
@@ -126,7 +126,7 @@ impl<'a> Methods<'a> {
             matrix
         };
         let dual = |i: usize| {
-            let blocks = expected_blocks(subject.declaration, &subject.formula, &samples[i]);
+            let blocks = expected_blocks(&subject.declaration, &subject.formula, &samples[i]);
             let hessian = blocks.into_iter().find(|block| block.name == BlockName::Hessian);
             hessian.expect("energies have Hessians").numbers
         };
@@ -159,7 +159,7 @@ impl<'a> Methods<'a> {
     }
 
     fn measured(&self, method: &'static str, nanoseconds: f64, error: f64) -> Measured {
-        Measured { element: self.subject.declaration.name, method, nanoseconds, error }
+        Measured { element: self.subject.declaration.name.to_string(), method, nanoseconds, error }
     }
 
     fn measure(&self, method: &'static str, run: impl Fn(usize) -> Vec<f64>) -> Measured {
@@ -209,7 +209,7 @@ fn least(count: usize, round: impl Fn()) -> f64 {
 }
 
 fn hessian(subject: &Subject, sample: &Sample, digits: usize) -> TrueBlock {
-    let blocks = truth(subject.declaration, &subject.formula, sample, digits);
+    let blocks = truth(&subject.declaration, &subject.formula, sample, digits);
     blocks.into_iter().find(|truth| truth.block.name == BlockName::Hessian).expect("energies have Hessians")
 }
 

@@ -111,7 +111,7 @@ pub fn csv(list: &[Measured]) -> String {
 #[must_use]
 pub fn plots(list: &[Measured]) -> Vec<(String, String)> {
     let of = |name: &str| list.iter().filter(|m| m.element == name).cloned().collect::<Vec<_>>();
-    let mut names: Vec<&str> = list.iter().map(|m| m.element).collect();
+    let mut names: Vec<&str> = list.iter().map(|m| &*m.element).collect();
     names.dedup();
     let mut groups: Vec<(String, Vec<Measured>)> = names.into_iter().map(|name| (name.to_owned(), of(name))).collect();
     groups.push(("all".into(), list.to_vec()));

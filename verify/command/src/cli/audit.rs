@@ -109,7 +109,7 @@ fn show(report: &Report) -> anyhow::Result<()> {
     let mut table = table(&["element", "block", "check", "worst error", "allowed", "order", "verdict"], &[3, 4, 5]);
     for line in &report.lines {
         table.add_row([
-            line.element.to_owned(),
+            line.element.to_string(),
             line.block.to_string(),
             line.check.title().to_owned(),
             format!("{:.1e}", line.worst),

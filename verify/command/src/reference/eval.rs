@@ -94,7 +94,7 @@ fn evaluate_record(value: &mut Value, potential: &str, source: Source) -> Result
                 Source::GeneratedCode => Vec::new(),
                 Source::Truth { digits } => {
                     let formula =
-                        Textbook::from_source(declaration.source).map_err(|e| format!("{}: {e}", declaration.name))?;
+                        Textbook::from_source(&declaration.source).map_err(|e| format!("{}: {e}", declaration.name))?;
                     truth(declaration, &formula, &sample, digits)
                 }
             };
@@ -123,14 +123,14 @@ pub fn evaluate_inputs(targets: &[Target], inputs: &Path, output: &Path, source:
     let mut records = Vec::new();
     for (name, sample) in crate::read_inputs(inputs)? {
         let found = match &name {
-            Some(name) => subjects.iter().find(|subject| subject.declaration.name == name),
+            Some(name) => subjects.iter().find(|subject| subject.declaration.name == **name),
             None => subjects.first().filter(|_| subjects.len() == 1),
         };
         let subject = found.with_context(|| match name {
             Some(name) => format!("{}: no declaration is called {name}", inputs.display()),
             None => format!("{}: name the element that the input is for", inputs.display()),
         })?;
-        sample.fits(subject.declaration).map_err(|why| anyhow::anyhow!("{}: {why}", inputs.display()))?;
+        sample.fits(&subject.declaration).map_err(|why| anyhow::anyhow!("{}: {why}", inputs.display()))?;
         records.push(evaluated(subject, &sample, source)?);
     }
     let text = serde_json::to_string_pretty(&json!({ "records": records }))?;
@@ -145,9 +145,9 @@ fn evaluated(subject: &Subject, sample: &Sample, source: Source) -> anyhow::Resu
         Ok(answer) => {
             let truths = match source {
                 Source::GeneratedCode => Vec::new(),
-                Source::Truth { digits } => truth(subject.declaration, &subject.formula, sample, digits),
+                Source::Truth { digits } => truth(&subject.declaration, &subject.formula, sample, digits),
             };
-            let (out, flags) = described(subject.declaration, &answer, (source, &truths), |_| true);
+            let (out, flags) = described(&subject.declaration, &answer, (source, &truths), |_| true);
             fields.extend([("out".to_owned(), Value::Object(out)), ("flags".to_owned(), Value::Object(flags))]);
         }
         Err(NoAnswer::Rest(error)) => {

@@ -85,7 +85,7 @@ pub fn policy(path: &Path) -> Result<Vec<PolicyLine>, RecordError> {
                         judge(rule, answer, name, answer.flags[name.order(kind)].any()).map_err(fail)?;
                     passed &= again.as_ref().is_ok_and(|again| same_bits(again.block(name), answer.block(name)));
                     if rule.status == "regular" {
-                        let formula = Textbook::from_source(declaration.source);
+                        let formula = Textbook::from_source(&declaration.source);
                         let formula = formula.map_err(|e| fail(format!("{}: {e}", declaration.name)))?;
                         passed &= continues(declaration, &formula, &sample, answer.block(name));
                     }
@@ -189,7 +189,7 @@ mod tests {
             positions: vec![0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 3.0, 0.0, 0.0],
             velocities: Vec::new(),
         };
-        let formula = Textbook::from_source(entry.declaration.source).unwrap();
+        let formula = Textbook::from_source(&entry.declaration.source).unwrap();
         let answer = evaluate(entry.declaration, entry.evaluate, &sample.inputs()).unwrap();
         let mut block = answer.block(BlockName::Hessian).clone();
         assert!(continues(entry.declaration, &formula, &sample, &block));

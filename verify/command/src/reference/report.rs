@@ -127,7 +127,7 @@ fn compare(path: &Path, mapping: &Mapping, records: &[Value]) -> Result<Vec<Bloc
             let at = lines.iter().position(|l| l.block == *block).unwrap_or_else(|| {
                 lines.push(BlockLine {
                     potential: mapping.potential.into(),
-                    element: mapping.entry.declaration.name,
+                    element: &mapping.entry.declaration.name,
                     block: block.clone(),
                     records: 0,
                     nan: 0,

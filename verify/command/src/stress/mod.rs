@@ -51,7 +51,7 @@ impl Point {
 #[derive(Clone, Debug, Serialize)]
 pub struct Track {
     /// Name of the element.
-    pub element: &'static str,
+    pub element: String,
     /// Name of the sweep.
     pub sweep: &'static str,
     /// Name of the block.
@@ -91,9 +91,12 @@ fn run(target: &Target, Sweep { name, inputs }: &Sweep) -> Result<Vec<Track>, St
         for (block, point) in at(&subject, sample, *parameter) {
             match tracks.iter_mut().find(|track| track.block == block) {
                 Some(track) => track.points.push(point),
-                None => {
-                    tracks.push(Track { element: subject.declaration.name, sweep: name, block, points: vec![point] })
-                }
+                None => tracks.push(Track {
+                    element: subject.declaration.name.to_string(),
+                    sweep: name,
+                    block,
+                    points: vec![point],
+                }),
             }
         }
     }
@@ -103,7 +106,7 @@ fn run(target: &Target, Sweep { name, inputs }: &Sweep) -> Result<Vec<Track>, St
 /// Evaluates all blocks at one input; empty if the rest shape is rejected.
 fn at(subject: &Subject, sample: &Sample, parameter: f64) -> Vec<(BlockName, Point)> {
     const DIGITS: usize = 20;
-    let declaration = subject.declaration;
+    let declaration = &*subject.declaration;
     let Ok(answer) = subject.answer(sample) else { return Vec::new() };
     let naive = expected_blocks(declaration, &subject.formula, sample);
     let truths = truth(declaration, &subject.formula, sample, DIGITS);

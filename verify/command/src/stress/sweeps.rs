@@ -37,7 +37,7 @@ const FOUR: &[(&str, Place)] = &[
 /// to the smallest and largest scales, far from the origin, and to its rest state. The first sweeps end at the
 /// singularity itself.
 #[must_use]
-pub fn sweeps(declaration: &'static Declaration) -> Vec<Sweep> {
+pub fn sweeps(declaration: &Declaration) -> Vec<Sweep> {
     if !has_points(declaration) {
         return Vec::new();
     }

@@ -97,14 +97,14 @@ pub(super) fn of_matrices(declaration: &Declaration, ordinary: &Sample) -> Vec<E
     let mut list = Vec::new();
     for dimension in [2, 3] {
         let has = |fields: &[energy_dsl::Field]| fields.iter().any(|field| field.size == dimension * dimension);
-        if has(declaration.points) {
+        if has(&declaration.points) {
             list.extend(each(dimension, |stretches, turned| {
-                let positions = place(declaration.points, &ordinary.positions, dimension, stretches, turned);
+                let positions = place(&declaration.points, &ordinary.positions, dimension, stretches, turned);
                 Sample { positions, ..ordinary.clone() }
             }));
-        } else if has(declaration.parameters) {
+        } else if has(&declaration.parameters) {
             list.extend(each(dimension, |stretches, turned| {
-                let parameters = place(declaration.parameters, &ordinary.parameters, dimension, stretches, turned);
+                let parameters = place(&declaration.parameters, &ordinary.parameters, dimension, stretches, turned);
                 Sample { parameters, ..ordinary.clone() }
             }));
         }

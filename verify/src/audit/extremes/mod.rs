@@ -35,7 +35,7 @@ impl Extreme {
 /// its parameters are kept.
 pub(super) fn extremes(subject: &Subject, ordinary: &Sample, seed: u64) -> Vec<Extreme> {
     let mut random = Rng::with_seed(seed ^ 0x6578_7472);
-    let declaration = subject.declaration;
+    let declaration = &*subject.declaration;
     let mut list = Vec::new();
     if let Some(rest) = rest::RestShape::of(declaration, ordinary) {
         let mut near = rest::near(&rest, ordinary, &mut random);

@@ -64,7 +64,7 @@ pub(super) fn near_parameter(subject: &Subject, ordinary: &Sample) -> Vec<Extrem
     let scalars: Vec<(usize, &str)> = (subject.declaration.parameters.iter())
         .filter_map(|field| {
             first += field.size;
-            (field.size == 1).then_some((first - 1, field.name))
+            (field.size == 1).then_some((first - 1, &*field.name))
         })
         .collect();
     let exact = Sample { positions: ordinary.positions.iter().map(|&x| dyadic(x)).collect(), ..ordinary.clone() };

@@ -361,7 +361,7 @@ impl TermDescription for PlateTerm {
         &self.name
     }
 
-    fn declaration(&self) -> &'static Declaration {
+    fn declaration(&self) -> &Declaration {
         <ArcAngle as Element>::DECLARATION
     }
 
