@@ -397,13 +397,34 @@ pub fn with_care<W: WithCare<INPUTS, OUTPUTS>, T: Real, const INPUTS: usize, con
     summed: usize,
 ) -> ([T; OUTPUTS], Flags<T>) {
     let mut outputs = [T::from_f64(0.0); OUTPUTS];
+    let flags = in_lanes(inputs, extraordinary, summed, &mut outputs, &|own: &[T::Unbounded]| {
+        let own = own.try_into().expect("as many numbers as inputs");
+        let (results, flags) = of_one::<W, T::Unbounded, INPUTS, OUTPUTS>(own);
+        (results.to_vec(), flags)
+    });
+    (outputs, flags)
+}
+
+/// Results at the inputs of one lane.
+type OfOne<'a, T> = &'a dyn Fn(&[T]) -> (Vec<T>, Flags<T>);
+
+/// Runs a path in some lanes. It is compiled once for a type of lanes, not once for a routine: it is more code than the
+/// paths themselves.
+#[inline(never)]
+fn in_lanes<T: Real>(
+    inputs: &[T],
+    lanes: T::Mask,
+    summed: usize,
+    outputs: &mut [T],
+    of_one: OfOne<'_, T::Unbounded>,
+) -> Flags<T> {
     let (mut degenerate, mut kink) = (0, 0);
     for lane in 0..u32::BITS as usize {
-        if extraordinary.bits() >> lane & 1 == 0 {
+        if lanes.bits() >> lane & 1 == 0 {
             continue;
         }
-        let own = std::array::from_fn(|i| inputs[i].unbounded(lane));
-        let (results, flags) = of_one::<W, T, INPUTS, OUTPUTS>(&own);
+        let own: Vec<T::Unbounded> = inputs.iter().map(|input| input.unbounded(lane)).collect();
+        let (results, flags) = of_one(&own);
         for (number, (output, result)) in outputs.iter_mut().zip(results).enumerate() {
             output.set_lane(lane, if number < summed { result } else { result.saturated() });
         }
@@ -411,20 +432,21 @@ pub fn with_care<W: WithCare<INPUTS, OUTPUTS>, T: Real, const INPUTS: usize, con
         kink |= u32::from(flags.kink.any()) << lane;
     }
     let mask = <T::Mask as Mask>::from_bits;
-    (outputs, Flags { degenerate: mask(degenerate), kink: mask(kink) })
+    Flags { degenerate: mask(degenerate), kink: mask(kink) }
 }
 
 /// Returns the results at one input.
-fn of_one<W: WithCare<INPUTS, OUTPUTS>, T: Real, const INPUTS: usize, const OUTPUTS: usize>(
-    inputs: &[T::Unbounded; INPUTS],
-) -> ([T::Unbounded; OUTPUTS], Flags<T::Unbounded>) {
+#[inline(never)]
+fn of_one<W: WithCare<INPUTS, OUTPUTS>, T: Real<Unbounded = T>, const INPUTS: usize, const OUTPUTS: usize>(
+    inputs: &[T; INPUTS],
+) -> ([T; OUTPUTS], Flags<T>) {
     let mut plain = [0.0; INPUTS];
     if doubles(inputs, &mut plain) && (W::compiled().is_outside)(&plain) {
-        let mut results = std::array::from_fn(|_| T::Unbounded::from_f64(0.0));
+        let mut results = std::array::from_fn(|_| T::from_f64(0.0));
         fill_outside(W::ROLES, &mut results);
         return (results, Flags::degenerate());
     }
-    let (mut results, care) = T::Unbounded::run_with_care::<W, INPUTS, OUTPUTS>(inputs);
+    let (mut results, care) = T::run_with_care::<W, INPUTS, OUTPUTS>(inputs);
     let along = |rays: &[Ray]| {
         let (results, care) = (W::compiled().ray)(rays.try_into().expect("as many rays as inputs"));
         (results.to_vec(), care.flags.degenerate)
