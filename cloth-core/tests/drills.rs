@@ -64,6 +64,8 @@ fn repeatable(path: &Path, contents: Vec<u8>) -> Option<Vec<u8>> {
             // A run that ended early has another one, until it continues.
             record["finished"].as_bool()?.then(|| record["summary"]["momentum"].to_string().into_bytes())
         }
+        // A failure is a row of the index, until the sweep continues.
+        "index.csv" if String::from_utf8_lossy(&contents).contains(",failed,") => None,
         "summary.txt" | "times.csv" => Some(Vec::new()),
         _ => Some(contents),
     }

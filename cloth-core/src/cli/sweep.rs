@@ -12,6 +12,7 @@ use cloth_core::run::{Ending, Record, Run, RunOptions};
 use cloth_core::scene::Scene;
 use cloth_core::sweep::{Choice, Grid};
 use energy_cli::{Interrupts, tell};
+use energy_files::{FolderLock, remove_parts};
 use toml::{Table, Value};
 
 use super::allowed_folders::AllowedFolders;
@@ -48,6 +49,8 @@ impl Sweep {
         let choices = grid.choices(&scene, &self.scene).context(file)?;
         energy_files::create_folder(&self.output)
             .with_context(|| format!("cannot create {}", self.output.display()))?;
+        let _lock = FolderLock::take(&self.output, LOCK)?;
+        remove_parts(&self.output).with_context(|| format!("cannot prepare {}", self.output.display()))?;
         let interrupts = Interrupts::listen()?;
         let failures = self.simulate(&choices, &interrupts)?;
         if interrupts.flag().load(Ordering::Relaxed) {
@@ -86,26 +89,30 @@ impl Sweep {
     }
 
     fn run_one(&self, choice: &Choice, interrupts: &Interrupts) -> Result<()> {
-        self.allowed
-            .check(&choice.text, &self.scene)
-            .map_err(|error| anyhow!(with_line(&choice.text, &error.to_string())))?;
+        self.allowed.check(&choice.text, &self.scene).map_err(|error| with_line(&choice.text, error))?;
         // A symbolic link in its place would lead elsewhere.
-        let folder = energy_files::subfolder(&self.output, &choice.name)?;
+        let cannot = |path: &Path| format!("cannot write {}", path.display());
+        let folder = energy_files::subfolder(&self.output, &choice.name)
+            .with_context(|| cannot(&self.output.join(&choice.name)))?;
         let done = folder.join(DONE);
         if done.symlink_metadata().is_ok_and(|done| done.is_file()) {
             return Ok(());
         }
         let options = RunOptions { overwrite: true, checkpoint_interval: Some(self.checkpoint), ignore_memory: false };
         let start = || Run::new(choice.text.clone(), &self.scene, &folder, options);
-        let run = match folder.join(OutputFolder::CHECKPOINT).exists() {
+        let has_state =
+            [OutputFolder::CHECKPOINT, OutputFolder::PREVIOUS_CHECKPOINT].map(|name| folder.join(name).exists());
+        let run = match has_state.contains(&true) {
             true => Run::resume(&folder, false).or_else(|_| start()),
             false => start(),
         };
-        let run = run.map_err(|error| anyhow!(with_line(&choice.text, &error.to_string())))?;
+        let run = run.map_err(|error| with_line(&choice.text, error))?;
         let ending = run.with_threads(1).go(interrupts.flag(), |_| ())?;
         match ending {
             Ending { failure: Some(failure), .. } => Err(failure.into()),
-            Ending { finished: true, abandoned: false, .. } => Ok(energy_files::write_whole(&done, b"")?),
+            Ending { finished: true, abandoned: false, .. } => {
+                energy_files::write_whole(&done, b"").with_context(|| cannot(&done))
+            }
             _ => Ok(()),
         }
     }
@@ -142,6 +149,8 @@ impl Sweep {
 /// The largest table of values, in bytes.
 const LARGEST_TABLE: u64 = 1 << 20;
 
+/// Lock of the folder: two sweeps must not write one index.
+const LOCK: &str = "cloth.lock";
 const INDEX: &str = "index.csv";
 /// A file in the folder of a run that was completed.
 const DONE: &str = "sweep.done";
@@ -160,11 +169,12 @@ const COLUMNS: [&str; 10] = [
 ];
 
 /// Adds the line of the text that a message names. Users never see the text: its values come from two files.
-fn with_line(text: &str, message: &str) -> String {
+fn with_line(text: &str, error: impl Into<anyhow::Error>) -> anyhow::Error {
+    let message = energy_cli::message(&error.into());
     let number = message.split(':').nth(1).and_then(|number| number.parse::<usize>().ok());
     match number.and_then(|number| text.lines().nth(number.checked_sub(1)?)) {
-        Some(line) => format!("{message}: {}", line.trim()),
-        None => message.to_owned(),
+        Some(line) => anyhow!("{message}: {}", energy_files::excerpt(line.trim())),
+        None => anyhow!(message),
     }
 }
 

@@ -133,8 +133,10 @@ impl OutputFolder {
         let folder = Self::unlocked(path)?;
         let folder = Self { lock: FolderLock::take(path, LOCK)?.map(Arc::new), ..folder };
         // A killed run may have left unfinished files.
-        let folders = [path.to_owned(), folder.frames()];
-        folders.iter().try_for_each(|path| remove_parts(path)).map_err(|source| {
+        let caches =
+            Some(path.join(Self::CACHES)).filter(|caches| caches.symlink_metadata().is_ok_and(|it| it.is_dir()));
+        let mut folders = [path.to_owned(), folder.frames()].into_iter().chain(caches);
+        folders.try_for_each(|path| remove_parts(&path)).map_err(|source| {
             let path = path.to_owned();
             OutputError::Folder { path, source }
         })?;

@@ -59,8 +59,9 @@ impl Drill<'_> {
                     assert_eq!(status.code(), Some(137), "{case}: {message}");
                 } else {
                     assert_eq!(status.code(), Some(1), "{case}: {message}");
-                    let is_told = message.contains("error: ") || message.contains("failed");
-                    assert!(is_told && message.contains("no storage space"), "{case}: {message}");
+                    // The file, by its path.
+                    let told = message.lines().find(|line| line.contains("no storage space"));
+                    assert!(told.is_some_and(|line| line.contains("/out")), "{case}: {message}");
                     assert_eq!(parts(&output), [] as [PathBuf; 0], "{case}");
                 }
                 self.assert_whole(&output, &whole, &case);
@@ -126,7 +127,8 @@ impl Drill<'_> {
     /// Starts the program and kills it after a time. Returns whether it was killed.
     fn is_killed(&self, output: &Path, after: Duration) -> bool {
         let mut command = self.command(output);
-        let mut child = command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().expect("the program can be started");
+        let mut child =
+            command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().expect("the program can be started");
         std::thread::sleep(after);
         // A program that has ended cannot be killed.
         let _ = child.kill();
