@@ -51,7 +51,11 @@ pub fn mesh_file(folder: &Path, kind: &str, frame: usize) -> PathBuf {
 /// files of killed programs.
 pub fn lock(folder: &Path) -> Result<Option<FolderLock>> {
     let lock = FolderLock::take(folder, LOCK)?;
-    remove_parts(folder).with_context(|| format!("cannot prepare {}", folder.display()))?;
+    let is_folder = |path: &PathBuf| path.symlink_metadata().is_ok_and(|it| it.is_dir());
+    let parts = [MESHES, PICTURES, SURFACE].map(|part| folder.join(part)).into_iter().filter(is_folder);
+    for path in parts.chain([folder.to_owned()]) {
+        remove_parts(&path).with_context(|| format!("cannot prepare {}", path.display()))?;
+    }
     Ok(lock)
 }
 
