@@ -35,7 +35,7 @@ pub(crate) const CHECKPOINT: Target = Target {
     name: "checkpoint",
     words: crate::fusion::WORDS,
     shared: &[],
-    made: || vec![STOPPED.checkpoint.clone()],
+    made: || STOPPED.iter().map(|run| run.checkpoint.clone()).collect(),
     read: checkpoint,
 };
 
@@ -44,7 +44,7 @@ pub(crate) const RUN_FOLDER: Target = Target {
     name: "run_folder",
     words: crate::fusion::WORDS,
     shared: &[],
-    made: || vec![STOPPED.record.clone()],
+    made: || STOPPED.iter().map(|run| run.record.clone()).collect(),
     read: run_folder,
 };
 
@@ -122,7 +122,7 @@ fn checkpoint(input: &[u8], folder: &Path) -> Result<(), String> {
     advance(&mut simulation)?;
     let write = |name: &str, contents: &[u8]| std::fs::write(folder.join(name), contents).expect("the folder is there");
     write(OutputFolder::CHECKPOINT, &file);
-    write(OutputFolder::SAVED_FRAMES, &STOPPED.frames);
+    write(OutputFolder::SAVED_FRAMES, &STOPPED[0].frames);
     Run::resume_checked(folder, true, |scene| scene.check_paths(&[])).map(drop).map_err(message)
 }
 
@@ -137,6 +137,48 @@ fn run_folder(input: &[u8], folder: &Path) -> Result<(), String> {
     Ok(())
 }
 
+/// Contact, friction, hair and plasticity, with steps that are retried.
+const IN_CONTACT: &str = r#"dt = 0.01
+duration = 0.1
+integrator = "newton"
+adaptive = true
+[mesh.sheet]
+cells = [2, 1]
+size = [0.2, 0.1]
+[fabric]
+density = 0.2
+friction = 0.3
+plasticity = { stretch = 1.01, curvature = 5.0 }
+material.stvk = { stretch_stiffness = 40.0, poisson_ratio = 0.3, bending.flat.stiffness = 1e-5 }
+[[obstacles]]
+sphere = { centre = [0.0, 0.0, -0.1], radius = 0.0985 }
+friction = 0.3
+[output]
+png = false
+gltf = false
+ledger = true
+"#;
+
+/// Histories of an integrator, and islands that fall asleep.
+const WITH_HISTORY: &str = r#"dt = 0.01
+duration = 0.1
+integrator = "bdf2"
+sleep = true
+[[garment]]
+mesh.sheet = { cells = [1, 1], size = [0.1, 0.1] }
+fabric.density = 0.2
+fabric.material.mass-spring = { structural = 10.0, shear = 5.0, bending = 1.0 }
+[[garment]]
+mesh.strip = { length = 0.1, width = 0.1, segments = 1, plane = "horizontal" }
+fabric.density = 0.2
+fabric.material.mass-spring = { structural = 10.0, shear = 5.0, bending = 1.0 }
+[[pins]]
+nearest = [0.0, 0.0, 0.0]
+[output]
+png = false
+gltf = false
+"#;
+
 /// The files of a small run that was stopped after two steps.
 struct Stopped {
     /// Contents of the checkpoint, without the seal.
@@ -145,10 +187,12 @@ struct Stopped {
     record: Vec<u8>,
 }
 
-static STOPPED: LazyLock<Stopped> = LazyLock::new(|| {
+static STOPPED: LazyLock<[Stopped; 3]> = LazyLock::new(|| [SMALL, IN_CONTACT, WITH_HISTORY].map(stopped));
+
+fn stopped(scene: &str) -> Stopped {
     let folder = tempfile::tempdir().expect("the folder of temporary files can be written to");
     let options = RunOptions { checkpoint_interval: Some(1), ignore_memory: true, ..RunOptions::default() };
-    let run = Run::new(SMALL.to_owned(), &scene_path(), folder.path(), options);
+    let run = Run::new(scene.to_owned(), &scene_path(), folder.path(), options);
     let (mut run, stop) = (run.expect("the scene is valid").with_threads(1), AtomicBool::new(false));
     let mut steps = 0;
     let ending = run.go(&stop, |_| {
@@ -167,7 +211,7 @@ static STOPPED: LazyLock<Stopped> = LazyLock::new(|| {
         frames: read(OutputFolder::SAVED_FRAMES),
         record: serde_json::to_vec(&record).expect("a record is JSON"),
     }
-});
+}
 
 const WORDS: &[&str] = &[
     "[[pins]]\n",
