@@ -1,7 +1,7 @@
 //! Every reader of files of strangers as a function of bytes, with seeds and random edits.
 //!
-//! A [`Target`] passes if it returns a result or an error. It fails by a panic, by an allocation beyond the limit of its
-//! program, by a long message, or if it takes more than [`PATIENCE`]. The tests of this crate replay seeds and
+//! A [`Target`] passes if it returns a result or an error. It fails by a panic, by an allocation beyond the limit of
+//! its program, by a long message, or if it takes more than [`PATIENCE`]. The tests of this crate replay seeds and
 //! regressions and some [edited](edits::edited) inputs; `cargo fuzz` finds inputs by the coverage of code.
 #![forbid(unsafe_code)]
 

@@ -80,7 +80,8 @@ macro_rules! tests {
         fn every_target_has_a_test_and_a_program() {
             let names = TARGETS.map(|target| target.name);
             assert_eq!(names, [$(stringify!($name)),*]);
-            let manifest = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("../Cargo.toml")).unwrap();
+            let manifest = Path::new(env!("CARGO_MANIFEST_DIR")).join("../Cargo.toml");
+            let manifest = std::fs::read_to_string(manifest).unwrap();
             for name in names {
                 assert!(manifest.contains(&format!("{{ name = \"{name}\", ")), "fuzz/Cargo.toml has no {name}");
             }

@@ -20,8 +20,8 @@ pub struct Drill<'a> {
     pub folder: &'a Path,
     /// Returns the arguments that begin the work, or continue it if the output folder has a state.
     pub arguments: fn(&Path) -> Vec<String>,
-    /// Returns the part of a file, given its path in the output folder, that does not depend on times; `None` for files
-    /// that may differ or be missing, such as states.
+    /// Returns the part of a file, given its path in the output folder, that does not depend on times. `None` for
+    /// files that may differ or be missing, such as states.
     pub repeatable: fn(&Path, Vec<u8>) -> Option<Vec<u8>>,
 }
 
@@ -33,8 +33,8 @@ const PATIENCE: Duration = Duration::from_secs(120);
 type Files = Vec<(PathBuf, Vec<u8>)>;
 
 impl Drill<'_> {
-    /// Injects a fault at each operation, and returns how many there were: a failure, a full disk and a kill in turn. With
-    /// the environment variable `DRILL_ALL`, each operation has all three.
+    /// Injects a fault at each operation, and returns how many there were: a failure, a full disk and a kill in turn.
+    /// With the environment variable `DRILL_ALL`, each operation has all three.
     ///
     /// # Panics
     /// If a fault goes unnoticed, leaves a damaged file, or keeps another try from completing the work.
