@@ -47,7 +47,7 @@ fn drill(folder: &TempDir) -> Drill<'_> {
 
 #[test]
 fn every_failure_of_a_track_is_told_and_mended() {
-    let count = drill(&folder(1)).faults();
+    let count = drill(&folder(2)).faults();
     assert!(count > 30, "{count} faults");
 }
 

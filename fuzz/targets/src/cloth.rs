@@ -148,7 +148,7 @@ size = [0.2, 0.1]
 [fabric]
 density = 0.2
 friction = 0.3
-plasticity = { stretch = 1.01, curvature = 5.0 }
+plasticity = { stretch = 1.01 }
 material.stvk = { stretch_stiffness = 40.0, poisson_ratio = 0.3, bending.flat.stiffness = 1e-5 }
 [[obstacles]]
 sphere = { centre = [0.0, 0.0, -0.1], radius = 0.0985 }
