@@ -15,6 +15,7 @@
 //!   - [`ledger`], [`model`]: the energy balance, and the assembly of a scene into islands
 //!   - [`simulation`], [`output`]: stepping, and output files
 //! - [`run`]: runs with checkpoints and reports
+//! - [`sweep`]: the scenes of a sweep
 //! - [`view`], [`demo`], [`materials`], [`mod@bench`], [`validate`]: what the binary offers on top
 //!
 //! ```
@@ -54,6 +55,7 @@ mod book;
 pub mod bench;
 pub mod demo;
 pub mod run;
+pub mod sweep;
 pub mod validate;
 pub mod view;
 

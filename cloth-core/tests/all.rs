@@ -4,12 +4,12 @@
 mod command_line;
 mod damping;
 mod deforming_obstacles;
+mod drills;
 mod endings;
 mod exclusions;
 mod exported_garment;
 mod folders;
 mod frame_rates;
-mod fuzz;
 mod hostile_folders;
 mod known_answers;
 mod limits;

@@ -7,6 +7,7 @@ use std::process::{Command, Output};
 use std::time::{Duration, Instant};
 
 use cloth_core::run::Checkpoint;
+use serde_json::json;
 use tempfile::TempDir;
 
 use crate::runs::with_scene;
@@ -148,6 +149,38 @@ fn a_run_continues_from_the_checkpoint_before_a_damaged_one() {
         let message = done(&["resume", "out"], path);
         assert!(message.contains("the run continues from the checkpoint before it"), "{message}");
         assert_eq!(results.each_ref().map(|file| std::fs::read(file).unwrap()), expected);
+    }
+}
+
+/// The checksum of a checkpoint finds damage, not forgery.
+#[test]
+fn forged_states_are_refused_or_continue_without_a_panic() {
+    let forgeries = [
+        ("newton", "/state/ledger/accounts/0/potential/0/0", json!(99), Some("ledger of the checkpoint does not fit")),
+        ("newton", "/state/ledger/accounts", json!([]), Some("ledger of the checkpoint does not fit")),
+        ("newton", "/state/ledger/entries/0/work", json!(vec![1.0; 20]), Some("ledger of the checkpoint does not fit")),
+        ("newton", "/state/islands/0/integrator/adaptive", json!([64, u32::MAX]), None),
+        ("newton", "/state/islands/0/bristles", json!([[[0, 0, 0]], []]), None),
+        ("bdf2", "/state/islands/0/integrator/last_step/after/x", json!([]), None),
+        ("bdf2", "/state/islands/0/integrator/last_step/before/v", json!([]), None),
+    ];
+    for integrator in ["newton", "bdf2"] {
+        let folder =
+            with_scene(&format!("adaptive = true\n{}", SCENE.replace("\"newton\"", &format!("\"{integrator}\""))));
+        let path = folder.path();
+        done(&RUN, path);
+        let file = path.join("out/checkpoint");
+        let whole = serde_json::to_value(Checkpoint::read(&file.with_extension("previous")).unwrap()).unwrap();
+        for (_, place, value, expected) in forgeries.iter().filter(|(of, ..)| *of == integrator) {
+            let mut forged = whole.clone();
+            *forged.pointer_mut(place).unwrap_or_else(|| panic!("{place}: {whole}")) = value.clone();
+            let forged: Checkpoint = serde_json::from_value(forged).unwrap();
+            std::fs::write(&file, forged.to_bytes().unwrap()).unwrap();
+            match expected {
+                Some(words) => assert!(refused(&["resume", "out"], path).contains(words), "{place}"),
+                None => drop(done(&["resume", "out"], path)),
+            }
+        }
     }
 }
 

@@ -47,7 +47,7 @@ where
         Hessians { energies: &mut energies, gradients: &mut gradients, triangles: &mut triangles, flagged: Vec::new() };
     for_each_batch(&Packed::new(&[element; COUNT], &stencils), &x, &mut wide);
     let flagged = wide.flagged;
-    let name = E::DECLARATION.name;
+    let name = &E::DECLARATION.name;
     for (number, own) in x.chunks(N).enumerate() {
         let at = element.hessian(&std::array::from_fn(|p| own[p]));
         let same = |a: &[f64], b: &[f64]| a.iter().zip(b).all(|(a, b)| a.to_bits() == b.to_bits());

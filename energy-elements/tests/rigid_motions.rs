@@ -68,7 +68,7 @@ fn a_blend_of_four_motions_is_accurate() {
 /// root. The ordinary path at small angles may need none of them.
 #[test]
 fn an_exponential_needs_at_most_one_sine_one_cosine_and_one_division() {
-    for routine in Exponential::<f64>::DECLARATION.routines {
+    for routine in Exponential::<f64>::DECLARATION.routines.iter() {
         let (transcendental, divisions) = (routine.full.transcendental, routine.full.divisions_and_roots);
         assert!(transcendental <= 2 && divisions <= 2, "{}: {transcendental}, {divisions}", routine.name);
     }

@@ -3,12 +3,12 @@
 mod attachments;
 mod bad_input;
 mod command_line;
+mod drills;
 mod figure;
 mod gltf_files;
 mod hostile_files;
 mod inputs;
 mod joints;
-mod mutated_files;
 mod real_body;
 mod resumed_tracks;
 mod surface;

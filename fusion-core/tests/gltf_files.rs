@@ -1,6 +1,5 @@
 //! Binary glTF files that are damaged, or made to do damage: each gives a body or an error, and never a panic.
 
-use std::panic::catch_unwind;
 use std::path::Path;
 
 use fusion_core::body::{SkinnedBody, parse_gltf};
@@ -253,67 +252,4 @@ fn forty_thousand_joints_take_no_time() {
     assert_eq!(read(&file.bytes()).unwrap().bones.len(), joints);
     let seconds = start.elapsed().as_secs_f64();
     assert!(seconds < 5.0, "{seconds} s, where a search per joint takes minutes");
-}
-
-/// Every place of the description with a value of its own.
-fn leaves(value: &Value, path: &str, found: &mut Vec<String>) {
-    match value {
-        Value::Object(map) => map.iter().for_each(|(key, value)| leaves(value, &format!("{path}/{key}"), found)),
-        Value::Array(list) => {
-            list.iter().enumerate().for_each(|(i, value)| leaves(value, &format!("{path}/{i}"), found))
-        }
-        _ => {}
-    }
-    found.push(path.to_owned());
-}
-
-/// Changes a file in one to three places: its description, its header, its data, or its length.
-fn mutated(random: &mut fastrand::Rng) -> Vec<u8> {
-    let mut file = File::new();
-    let mut paths = Vec::new();
-    leaves(&file.json, "", &mut paths);
-    let numbers = [json!(0), json!(1), json!(2), json!(3), json!(5), json!(255), json!(5120), json!(5123), json!(5126)];
-    let large = [json!(-1), json!(1_u64 << 31), json!(1_u64 << 32), json!(u64::MAX), json!(1e300), json!(0.5)];
-    let others = [Value::Null, json!([]), json!({}), json!("SCALAR"), json!("MAT4"), json!(true), json!("\u{1b}[2J")];
-    for _ in 0..random.u32(0..3) {
-        let path = &paths[random.usize(..paths.len())];
-        let list = random.choice([&numbers[..], &large[..], &others[..]]).unwrap();
-        if let Some(value) = file.json.pointer_mut(path) {
-            *value = random.choice(list).unwrap().clone();
-        }
-    }
-    let mut bytes = file.bytes();
-    for _ in 0..random.u32(0..3) {
-        let at = random.usize(..bytes.len());
-        match random.u32(0..6) {
-            0 => bytes[random.usize(..24)] = random.u8(..),
-            1 => bytes.truncate(at.max(24)),
-            2 => bytes.extend([0; 4]),
-            3 => drop(bytes.splice(at..at, [random.u8(..); 4])),
-            _ => bytes[at] = random.u8(..),
-        }
-    }
-    bytes
-}
-
-#[test]
-fn no_mutated_file_causes_a_panic() {
-    let mut random = fastrand::Rng::with_seed(56);
-    let (mut read_count, total) = (0, 10_000);
-    for case in 0..total {
-        let bytes = mutated(&mut random);
-        let outcome = catch_unwind(|| read(&bytes)).unwrap_or_else(|_| panic!("case {case}: a panic"));
-        match outcome {
-            Ok(body) => {
-                read_count += 1;
-                let mesh = &body.mesh;
-                assert!(mesh.triangles.iter().flatten().all(|&v| (v as usize) < mesh.vertices.len()), "case {case}");
-                assert!(mesh.vertices.iter().all(|v| v.iter().all(|x| x.is_finite())), "case {case}");
-                assert!(body.weights.iter().flatten().all(|&(bone, w)| bone < body.bones.len() && w > 0.0));
-            }
-            Err(error) => assert!(error.len() < 600, "case {case}: a message of {} bytes", error.len()),
-        }
-    }
-    // Mutations reach all parts only if most, but not all files are refused.
-    assert!((total / 20..total / 2).contains(&read_count), "{read_count} of {total}");
 }

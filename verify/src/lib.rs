@@ -23,7 +23,6 @@ pub mod dual;
 mod eigenvalues;
 mod finite_difference;
 pub mod formula;
-pub mod fuzz;
 pub mod geometry;
 mod jet;
 pub mod multiprecision;

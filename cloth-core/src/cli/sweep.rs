@@ -1,18 +1,18 @@
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use std::slice;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread;
 
-use anyhow::{Context, Result, anyhow, bail};
+use anyhow::{Context, Result, anyhow};
 use clap::Args;
 use cloth_core::output::OutputFolder;
-use cloth_core::run::{Checkpoint, Ending, Record, Run, RunOptions};
+use cloth_core::run::{Ending, Record, Run, RunOptions};
 use cloth_core::scene::Scene;
+use cloth_core::sweep::{Choice, Grid};
 use energy_cli::{Interrupts, tell};
-use energy_files::excerpt;
+use energy_files::{FolderLock, remove_parts};
 use toml::{Table, Value};
 
 use super::allowed_folders::AllowedFolders;
@@ -37,35 +37,27 @@ pub struct Sweep {
     checkpoint: u64,
 }
 
-/// One run of a sweep.
-#[derive(Debug)]
-struct Choice {
-    /// Values of the parameters, in the order of their keys.
-    values: Vec<Value>,
-    /// Text of the scene.
-    text: String,
-    /// Name of the folder: a hash of everything that the run reads. The same run continues in the same folder. After an
-    /// edit of a mesh, no earlier result counts.
-    name: String,
-}
-
 impl Sweep {
     pub fn run(self) -> Result<ExitCode> {
-        let base: Table = Scene::text(&self.scene)?.parse().with_context(|| self.scene.display().to_string())?;
+        let text = Scene::text(&self.scene)?;
+        // Errors of the scene are those of the parser of scenes, with their place.
+        let scene = text.parse().or_else(|_| Scene::parse(&text, &self.scene).map(|_| Table::new()))?;
         let file = self.parameters.display().to_string();
         let text =
             energy_files::read_text(&self.parameters, LARGEST_TABLE).with_context(|| format!("cannot read {file}"))?;
-        let mut grid = Vec::new();
-        flatten("", &text.parse().with_context(|| file.clone())?, &mut grid).with_context(|| file.clone())?;
-        let choices = choices(&base, &grid, &self.scene).context(file)?;
-        std::fs::create_dir_all(&self.output).with_context(|| format!("cannot create {}", self.output.display()))?;
+        let grid = Grid::parse(&text).with_context(|| file.clone())?;
+        let choices = grid.choices(&scene, &self.scene).context(file)?;
+        energy_files::create_folder(&self.output)
+            .with_context(|| format!("cannot create {}", self.output.display()))?;
+        let _lock = FolderLock::take(&self.output, LOCK)?;
+        remove_parts(&self.output).with_context(|| format!("cannot prepare {}", self.output.display()))?;
         let interrupts = Interrupts::listen()?;
         let failures = self.simulate(&choices, &interrupts)?;
         if interrupts.flag().load(Ordering::Relaxed) {
             tell("stopped; the same command continues the sweep");
             return Ok(interrupts.exit_code());
         }
-        let keys: Vec<&str> = grid.iter().map(|(key, _)| key.as_str()).collect();
+        let keys: Vec<&str> = grid.keys().collect();
         self.write_index(&keys, &choices, &failures)?;
         let failed = failures.iter().flatten().count();
         print(&format!("{} runs, {failed} failed; see {}\n", choices.len(), self.output.join(INDEX).display()))?;
@@ -97,26 +89,30 @@ impl Sweep {
     }
 
     fn run_one(&self, choice: &Choice, interrupts: &Interrupts) -> Result<()> {
-        self.allowed
-            .check(&choice.text, &self.scene)
-            .map_err(|error| anyhow!(with_line(&choice.text, &error.to_string())))?;
+        self.allowed.check(&choice.text, &self.scene).map_err(|error| with_line(&choice.text, error))?;
         // A symbolic link in its place would lead elsewhere.
-        let folder = energy_files::subfolder(&self.output, &choice.name)?;
+        let cannot = |path: &Path| format!("cannot write {}", path.display());
+        let folder = energy_files::subfolder(&self.output, &choice.name)
+            .with_context(|| cannot(&self.output.join(&choice.name)))?;
         let done = folder.join(DONE);
         if done.symlink_metadata().is_ok_and(|done| done.is_file()) {
             return Ok(());
         }
         let options = RunOptions { overwrite: true, checkpoint_interval: Some(self.checkpoint), ignore_memory: false };
         let start = || Run::new(choice.text.clone(), &self.scene, &folder, options);
-        let run = match folder.join(OutputFolder::CHECKPOINT).exists() {
+        let has_state =
+            [OutputFolder::CHECKPOINT, OutputFolder::PREVIOUS_CHECKPOINT].map(|name| folder.join(name).exists());
+        let run = match has_state.contains(&true) {
             true => Run::resume(&folder, false).or_else(|_| start()),
             false => start(),
         };
-        let run = run.map_err(|error| anyhow!(with_line(&choice.text, &error.to_string())))?;
+        let run = run.map_err(|error| with_line(&choice.text, error))?;
         let ending = run.with_threads(1).go(interrupts.flag(), |_| ())?;
         match ending {
             Ending { failure: Some(failure), .. } => Err(failure.into()),
-            Ending { finished: true, abandoned: false, .. } => Ok(energy_files::write_whole(&done, b"")?),
+            Ending { finished: true, abandoned: false, .. } => {
+                energy_files::write_whole(&done, b"").with_context(|| cannot(&done))
+            }
             _ => Ok(()),
         }
     }
@@ -152,9 +148,9 @@ impl Sweep {
 
 /// The largest table of values, in bytes.
 const LARGEST_TABLE: u64 = 1 << 20;
-/// The largest number of runs. All their scenes are in memory.
-const MOST_RUNS: usize = 10_000;
 
+/// Lock of the folder: two sweeps must not write one index.
+const LOCK: &str = "cloth.lock";
 const INDEX: &str = "index.csv";
 /// A file in the folder of a run that was completed.
 const DONE: &str = "sweep.done";
@@ -173,11 +169,12 @@ const COLUMNS: [&str; 10] = [
 ];
 
 /// Adds the line of the text that a message names. Users never see the text: its values come from two files.
-fn with_line(text: &str, message: &str) -> String {
+fn with_line(text: &str, error: impl Into<anyhow::Error>) -> anyhow::Error {
+    let message = energy_cli::message(&error.into());
     let number = message.split(':').nth(1).and_then(|number| number.parse::<usize>().ok());
     match number.and_then(|number| text.lines().nth(number.checked_sub(1)?)) {
-        Some(line) => format!("{message}: {}", line.trim()),
-        None => message.to_owned(),
+        Some(line) => anyhow!("{message}: {}", energy_files::excerpt(line.trim())),
+        None => anyhow!(message),
     }
 }
 
@@ -202,80 +199,4 @@ fn results(folder: &Path) -> Result<(Vec<String>, String)> {
 /// Quotes a cell of a CSV file if it has to be.
 fn cell(text: &str) -> String {
     if text.contains([',', '"', '\n', '\r']) { format!("\"{}\"", text.replace('"', "\"\"")) } else { text.to_owned() }
-}
-
-/// Lists the keys of nested tables as paths, `fabric.density`, with their values.
-fn flatten(prefix: &str, table: &Table, grid: &mut Vec<(String, Vec<Value>)>) -> Result<()> {
-    for (key, value) in table {
-        let path = if prefix.is_empty() { key.clone() } else { format!("{prefix}.{key}") };
-        match value {
-            Value::Table(table) => flatten(&path, table, grid)?,
-            Value::Array(values) => grid.push((path, values.clone())),
-            other => bail!("{path}: expected a list of values, got {other}"),
-        }
-    }
-    Ok(())
-}
-
-/// Returns all combinations of values; the last key varies fastest. `path` is that of the scene.
-fn choices(base: &Table, grid: &[(String, Vec<Value>)], path: &Path) -> Result<Vec<Choice>> {
-    let count = grid.iter().try_fold(1_usize, |count, (_, values)| count.checked_mul(values.len()));
-    if count.is_none_or(|count| count > MOST_RUNS) {
-        let lists = grid.iter().map(|(key, values)| format!("{} of {key}", values.len())).collect::<Vec<_>>();
-        bail!("expected at most {MOST_RUNS} runs, got all combinations of {}", excerpt(&lists.join(", ")));
-    }
-    let mut combinations: Vec<Vec<Value>> = vec![Vec::new()];
-    for (_, values) in grid {
-        let extend = |head: Vec<Value>| values.iter().map(move |value| [&head[..], slice::from_ref(value)].concat());
-        combinations = combinations.into_iter().flat_map(extend).collect();
-    }
-    let choice = |values: Vec<Value>| {
-        let mut scene = base.clone();
-        for ((key, _), value) in grid.iter().zip(&values) {
-            set(&mut scene, key, value)?;
-        }
-        let text = toml::to_string(&scene)?;
-        let name = format!("{:016x}", identity(&text, path));
-        Ok(Choice { values, text, name })
-    };
-    combinations.into_iter().map(choice).collect()
-}
-
-/// Sets the value at a path, `obstacles.0.friction`. Numbers are places in lists; missing tables are created.
-fn set(scene: &mut Table, path: &str, value: &Value) -> Result<()> {
-    let (tables, last) = path.rsplit_once('.').map_or((None, path), |(tables, last)| (Some(tables), last));
-    let mut table = scene;
-    let mut keys = tables.into_iter().flat_map(|tables| tables.split('.'));
-    while let Some(key) = keys.next() {
-        let mut entry = table.entry(key).or_insert_with(|| Table::new().into());
-        if let Value::Array(list) = entry {
-            let place = keys.next().and_then(|place| place.parse::<usize>().ok());
-            let message = format!("{path}: expected one of the {} places of `{key}`, counted from 0", list.len());
-            entry = place.and_then(|place| list.get_mut(place)).context(message)?;
-        }
-        let Value::Table(next) = entry else { bail!("{path}: `{key}` is not a table of the scene") };
-        table = next;
-    }
-    table.insert(last.to_owned(), value.clone());
-    Ok(())
-}
-
-/// Returns a hash of what a run reads: the version of the program, the text of its scene, and the meshes and materials
-/// that the scene names. An invalid scene has none.
-fn identity(text: &str, path: &Path) -> u64 {
-    let version = format!("{}, checkpoints {}\n", env!("CARGO_PKG_VERSION"), Checkpoint::VERSION);
-    let files = Scene::parse(text, path).map_or_else(|_| Vec::new(), |scene| scene.input_files());
-    let start = [version.as_bytes(), text.as_bytes()].into_iter().fold(FNV_OFFSET, fnv1a);
-    files.iter().fold(start, |hash, file| match std::fs::read(file) {
-        Ok(contents) => fnv1a(fnv1a(hash, &contents.len().to_le_bytes()), &contents),
-        Err(_) => fnv1a(hash, b"unreadable"),
-    })
-}
-
-/// The start of the hash FNV-1a.
-const FNV_OFFSET: u64 = 0xcbf2_9ce4_8422_2325;
-
-/// Continues the hash FNV-1a with some bytes.
-fn fnv1a(hash: u64, bytes: &[u8]) -> u64 {
-    bytes.iter().fold(hash, |hash, &byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3))
 }

@@ -1,7 +1,7 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
-use energy_files::{FolderLock, remove_parts, subfolder};
+use energy_files::{FolderLock, create_folder, remove_file, remove_parts, subfolder};
 
 /// Model in a recording.
 pub const MODEL: &str = "model.json";
@@ -51,7 +51,11 @@ pub fn mesh_file(folder: &Path, kind: &str, frame: usize) -> PathBuf {
 /// files of killed programs.
 pub fn lock(folder: &Path) -> Result<Option<FolderLock>> {
     let lock = FolderLock::take(folder, LOCK)?;
-    remove_parts(folder).with_context(|| format!("cannot prepare {}", folder.display()))?;
+    let is_folder = |path: &PathBuf| path.symlink_metadata().is_ok_and(|it| it.is_dir());
+    let parts = [MESHES, PICTURES, SURFACE].map(|part| folder.join(part)).into_iter().filter(is_folder);
+    for path in parts.chain([folder.to_owned()]) {
+        remove_parts(&path).with_context(|| format!("cannot prepare {}", path.display()))?;
+    }
     Ok(lock)
 }
 
@@ -59,7 +63,7 @@ pub fn lock(folder: &Path) -> Result<Option<FolderLock>> {
 /// files of an earlier run, so that no folder mixes two runs.
 pub fn prepare(folder: &Path, parts: &[&str], files: &[&str], overwrite: bool) -> Result<Option<FolderLock>> {
     let here = || format!("cannot prepare {}", folder.display());
-    std::fs::create_dir_all(folder).with_context(here)?;
+    create_folder(folder).with_context(here)?;
     let lock = lock(folder)?;
     let is_there = |path: &PathBuf| path.symlink_metadata().is_ok();
     let mut old: Vec<PathBuf> = files.iter().map(|file| folder.join(file)).filter(is_there).collect();
@@ -76,6 +80,6 @@ pub fn prepare(folder: &Path, parts: &[&str], files: &[&str], overwrite: bool) -
     if let (false, Some(path)) = (overwrite, old.first()) {
         bail!("{} exists; choose another folder, or allow --overwrite", path.display());
     }
-    old.iter().try_for_each(std::fs::remove_file).with_context(here)?;
+    old.iter().try_for_each(remove_file).with_context(here)?;
     Ok(lock)
 }

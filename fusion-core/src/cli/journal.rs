@@ -148,7 +148,7 @@ impl Journal {
         // The checkpoint first: without it, the frames mean nothing.
         let files: [PathBuf; 3] = [last.clone(), sealed::previous(&last), self.file.path().to_owned()];
         for path in files.iter().filter(|path| path.symlink_metadata().is_ok()) {
-            std::fs::remove_file(path).with_context(|| format!("cannot remove {}", path.display()))?;
+            energy_files::remove_file(path).with_context(|| format!("cannot remove {}", path.display()))?;
         }
         Ok(())
     }

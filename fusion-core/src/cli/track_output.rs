@@ -63,7 +63,7 @@ impl TrackOutput {
         let path = self.folder.join(USD);
         let last = self.time(frames.saturating_sub(1));
         let writer = UsdWriter::create(&path, &self.triangles, self.frames_per_second, last);
-        self.usd = Some(writer.with_context(|| format!("cannot write {}", path.display()))?);
+        self.usd = Some(writer.with_context(|| cannot_write(&path))?);
         Ok(self)
     }
 
@@ -77,7 +77,7 @@ impl TrackOutput {
     pub fn add(&mut self, frame: usize, image: Option<&DepthImage>, vertices: &[Vector3<f64>]) -> Result<()> {
         let time = self.time(frame);
         if let Some(usd) = &mut self.usd {
-            usd.frame(time, vertices).context(USD)?;
+            usd.frame(time, vertices).with_context(|| cannot_write(&self.folder.join(USD)))?;
         }
         if let Some(frames) = &mut self.frames {
             frames.push(vertices.to_vec());
@@ -100,7 +100,7 @@ impl TrackOutput {
         if let Some(pictures) = self.pictures {
             write_picture(&self.folder.join(FILM), film(&pictures, self.frames_per_second as u16))?;
         }
-        self.usd.map_or(Ok(()), UsdWriter::finish).context(USD)
+        self.usd.map_or(Ok(()), UsdWriter::finish).with_context(|| cannot_write(&self.folder.join(USD)))
     }
 
     /// Returns the time code of a frame: frames of the usual interval since the first image.
@@ -111,4 +111,8 @@ impl TrackOutput {
         };
         self.times.as_ref().and_then(since).unwrap_or(frame as f64)
     }
+}
+
+fn cannot_write(path: &Path) -> String {
+    format!("cannot write {}", path.display())
 }

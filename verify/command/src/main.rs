@@ -27,7 +27,6 @@ enum Command {
     Reference(cli::Reference),
     Stress(cli::Stress),
     Bench(cli::Bench),
-    Fuzz(cli::Fuzz),
     Show(cli::Show),
     Eval(cli::Eval),
 }
@@ -40,7 +39,6 @@ impl Command {
             Self::Reference(command) => command.run(),
             Self::Stress(command) => command.run(),
             Self::Bench(command) => command.run(),
-            Self::Fuzz(command) => command.run(),
             Self::Show(command) => command.run(),
             Self::Eval(command) => command.run(),
         }

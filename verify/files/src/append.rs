@@ -1,7 +1,8 @@
 use std::fs::{File, OpenOptions};
-use std::io::{Error, ErrorKind, Read, Result, Write};
+use std::io::{Error, ErrorKind, Read, Result};
 use std::path::{Path, PathBuf};
 
+use crate::fault;
 use crate::read::open_state;
 
 /// A file that only grows, next to a checkpoint that has its length and checksum. What was added after the checkpoint
@@ -20,6 +21,7 @@ impl AppendFile {
     /// # Errors
     /// If the file exists or cannot be created.
     pub fn create(path: &Path) -> Result<Self> {
+        fault::operation()?;
         let file = File::create_new(path)?;
         Ok(Self { file, path: path.to_owned(), length: 0, checksum: crc32fast::Hasher::new() })
     }
@@ -55,6 +57,7 @@ impl AppendFile {
         if hasher.clone().finalize() != checksum {
             return Err(damaged("its checksum does not match"));
         }
+        fault::operation()?;
         file.set_len(length)?;
         Ok((Self { file, path: path.to_owned(), length, checksum: hasher }, contents))
     }
@@ -64,7 +67,10 @@ impl AppendFile {
     /// # Errors
     /// If the file cannot be written.
     pub fn append(&mut self, bytes: &[u8]) -> Result<()> {
-        self.file.write_all(bytes)?;
+        let mut rest = bytes;
+        while !rest.is_empty() {
+            rest = &rest[fault::write(&mut self.file, rest)?..];
+        }
         self.checksum.update(bytes);
         self.length += bytes.len() as u64;
         Ok(())
@@ -75,6 +81,7 @@ impl AppendFile {
     /// # Errors
     /// If the disk cannot be written.
     pub fn sync(&self) -> Result<()> {
+        fault::operation()?;
         self.file.sync_data()
     }
 

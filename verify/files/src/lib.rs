@@ -12,6 +12,7 @@
 #![forbid(unsafe_code)]
 
 mod append;
+mod fault;
 mod folder;
 mod input_file;
 mod lock;
@@ -21,7 +22,7 @@ pub mod sealed;
 mod write;
 
 pub use append::AppendFile;
-pub use folder::subfolder;
+pub use folder::{create_folder, remove_file, subfolder};
 pub use input_file::InputFile;
 pub use lock::{FolderLock, LockError};
 pub use print::{excerpt, printable};

@@ -5,6 +5,7 @@ use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{ErrorKind, Read, Seek, Write};
 use std::path::{Path, PathBuf};
 
+use crate::fault;
 use crate::read::{is_same, open_state};
 
 /// A folder that cannot be locked.
@@ -103,7 +104,7 @@ impl FolderLock {
             }
             // Between opening and locking, another program may have ended and removed the file: then lock the new one.
             if is_at(&file, &path) {
-                let written = file.set_len(0).and_then(|()| file.rewind());
+                let written = fault::operation().and_then(|()| file.set_len(0)).and_then(|()| file.rewind());
                 written.and_then(|()| write!(file, "{}", std::process::id())).map_err(failed)?;
                 return Ok(Some(Self { path, _file: file }));
             }
@@ -120,6 +121,7 @@ impl Drop for FolderLock {
 
 /// Opens the file of a lock without following a symbolic link, or creates it.
 fn open(path: &Path) -> std::io::Result<File> {
+    fault::operation()?;
     let mut options = OpenOptions::new();
     options.read(true).write(true);
     match path.symlink_metadata() {

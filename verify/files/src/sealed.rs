@@ -9,7 +9,7 @@ use std::fmt;
 use std::io::{ErrorKind, Result};
 use std::path::{Path, PathBuf};
 
-use crate::write::{sync_folder, write_whole};
+use crate::write::{rename, sync_folder, write_whole};
 
 /// Kind and version of sealed files.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -103,7 +103,7 @@ pub fn previous(path: &Path) -> PathBuf {
 /// # Errors
 /// If a file cannot be written.
 pub fn write_generation(path: &Path, file: &[u8]) -> Result<()> {
-    match std::fs::rename(path, previous(path)) {
+    match rename(path, &previous(path)) {
         Ok(()) => sync_folder(path)?,
         Err(error) if error.kind() == ErrorKind::NotFound => {}
         Err(error) => return Err(error),
@@ -116,7 +116,7 @@ pub fn write_generation(path: &Path, file: &[u8]) -> Result<()> {
 /// # Errors
 /// If a file cannot be renamed.
 pub fn restore_generation(path: &Path) -> Result<()> {
-    std::fs::rename(previous(path), path)?;
+    rename(&previous(path), path)?;
     sync_folder(path)
 }
 

@@ -7,6 +7,9 @@ use std::hash::{BuildHasher, Hasher};
 use std::io::{ErrorKind, Result, Write};
 use std::path::{Path, PathBuf};
 
+use crate::fault;
+use crate::folder::remove_file;
+
 /// Writes a file completely or not at all: writes a new file in the same folder, then renames it. The file and its name
 /// are on the disk when the function returns.
 ///
@@ -29,8 +32,8 @@ pub fn write_whole(path: &Path, contents: &[u8]) -> Result<()> {
 /// A file that appears under its name when it is complete. Until then it has a random name in the same folder; it is
 /// removed if it is not finished.
 ///
-/// It is written to as any [`Write`]. No other file is overwritten and no symbolic link is followed: the new file is created exclusively, and renaming
-/// replaces a link instead of following it.
+/// It is written to as any [`Write`]. No other file is overwritten and no symbolic link is followed: the new file is
+/// created exclusively, and renaming replaces a link instead of following it.
 #[derive(Debug)]
 pub struct PartFile {
     file: File,
@@ -47,6 +50,7 @@ impl PartFile {
     pub fn create(path: &Path) -> Result<Self> {
         let (part, file) = loop {
             let part = path.with_file_name(random_name(path.extension()));
+            fault::operation()?;
             match OpenOptions::new().write(true).create_new(true).open(&part) {
                 Ok(file) => break (part, file),
                 Err(error) if error.kind() == ErrorKind::AlreadyExists => {}
@@ -67,8 +71,9 @@ impl PartFile {
     /// # Errors
     /// If the file cannot be written.
     pub fn finish(mut self) -> Result<()> {
+        fault::operation()?;
         self.file.sync_all()?;
-        std::fs::rename(&self.part, &self.target)?;
+        rename(&self.part, &self.target)?;
         self.is_finished = true;
         sync_folder(&self.target)
     }
@@ -76,7 +81,7 @@ impl PartFile {
 
 impl Write for PartFile {
     fn write(&mut self, bytes: &[u8]) -> Result<usize> {
-        self.file.write(bytes)
+        fault::write(&mut self.file, bytes)
     }
 
     fn flush(&mut self) -> Result<()> {
@@ -101,7 +106,7 @@ pub fn remove_parts(folder: &Path) -> Result<()> {
     for entry in std::fs::read_dir(folder)? {
         let entry = entry?;
         if entry.file_name().to_str().is_some_and(is_part) && entry.file_type()?.is_file() {
-            std::fs::remove_file(entry.path())?;
+            remove_file(entry.path())?;
         }
     }
     Ok(())
@@ -126,9 +131,16 @@ fn is_part(name: &str) -> bool {
     })
 }
 
+/// Gives a file another name in its folder.
+pub(crate) fn rename(from: &Path, to: &Path) -> Result<()> {
+    fault::operation()?;
+    std::fs::rename(from, to)
+}
+
 /// Makes the names in a file's folder durable.
 #[cfg(unix)]
 pub(crate) fn sync_folder(file: &Path) -> Result<()> {
+    fault::operation()?;
     let folder = file.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     match File::open(folder)?.sync_all() {
         // Some file systems cannot sync folders.

@@ -90,7 +90,12 @@ impl Bristles {
 
     /// Restores the deflections of a checkpoint.
     pub fn restored(memory: ContactMemory) -> Self {
-        Self::in_order((memory.names, memory.vectors))
+        let ContactMemory { mut names, mut vectors } = memory;
+        // Those of a damaged checkpoint may have different lengths.
+        let count = names.len().min(vectors.len());
+        names.truncate(count);
+        vectors.truncate(count);
+        Self::in_order((names, vectors))
     }
 }
 

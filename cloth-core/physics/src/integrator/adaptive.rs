@@ -66,7 +66,7 @@ impl Integrator for Adaptive {
                 Ok(one) => {
                     report += one;
                     done += part;
-                    self.successes += 1;
+                    self.successes = self.successes.saturating_add(1);
                     if self.successes >= Self::PATIENCE && self.halvings > 0 {
                         (self.halvings, self.successes) = (self.halvings - 1, 0);
                     }
@@ -95,7 +95,9 @@ impl Integrator for Adaptive {
     }
 
     fn restore(&mut self, memory: IntegratorMemory) {
-        [self.halvings, self.successes] = memory.adaptive;
+        let [halvings, successes] = memory.adaptive;
+        // A damaged checkpoint may have any number.
+        (self.halvings, self.successes) = (halvings.min(Self::MOST_HALVINGS), successes);
         self.inner.restore(memory);
     }
 

@@ -44,19 +44,20 @@ impl Trial {
 
     /// Records a solve by the solver in use, and decides which one comes next.
     pub(super) fn note(&mut self, iterations: usize, relative_tolerance: f64) {
-        self.count += 1;
-        self.iterations += iterations as u32;
-        self.digits += (-1000.0 * relative_tolerance.log10()).max(1.0) as u32;
+        // Sums of a damaged checkpoint may be any.
+        self.count = self.count.saturating_add(1);
+        self.iterations = self.iterations.saturating_add(iterations as u32);
+        self.digits = self.digits.saturating_add((-1000.0 * relative_tolerance.log10()).max(1.0) as u32);
         if self.count < ROUND {
             return;
         }
         let digits = f64::from(self.digits) / f64::from(1000 * ROUND);
         let found = (f64::from(self.iterations) / f64::from(ROUND) / digits * 1000.0) as u32;
-        (self.count, self.iterations, self.digits, self.rounds) = (0, 0, 0, self.rounds + 1);
+        (self.count, self.iterations, self.digits, self.rounds) = (0, 0, 0, self.rounds.saturating_add(1));
         let was_multigrid = self.multigrid;
         if self.multigrid {
             // Average: a few nearly indefinite systems take long with either solver.
-            self.cycles = if self.cycles == 0 { found } else { (self.cycles + found) / 2 };
+            self.cycles = if self.cycles == 0 { found } else { self.cycles.midpoint(found) };
             let served = multigrid_cost(self.cycles, digits) <= MARGIN * relaxation_cost(self.relaxations, digits);
             self.multigrid = served && self.rounds < PATIENCE;
         } else {

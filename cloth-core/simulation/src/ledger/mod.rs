@@ -173,6 +173,20 @@ impl Ledger {
         &self.works
     }
 
+    /// Whether a ledger from a file has the accounts of so many islands, and columns for all their numbers.
+    pub(crate) fn fits(&self, islands: usize) -> bool {
+        let columns = [self.potentials.len(), self.works.len()];
+        let has_columns = |account: &Account| {
+            let within = |numbers: &[(usize, f64)], columns| numbers.iter().all(|(column, _)| *column < columns);
+            within(&account.potential, columns[0]) && within(&account.work, columns[1])
+        };
+        self.changed.is_empty()
+            && self.accounts.len() == islands
+            && self.accounts.iter().all(has_columns)
+            && !self.entries.is_empty()
+            && self.entries.iter().all(|entry| [entry.potential.len(), entry.work.len()] == columns)
+    }
+
     /// The account of an island before the current step.
     pub(crate) fn account(&self, island: usize) -> &Account {
         &self.accounts[island]

@@ -1,7 +1,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use energy_files::{FolderLock, LockError, PartFile, remove_parts, subfolder};
+use energy_files::{FolderLock, LockError, PartFile, create_folder, remove_file, remove_parts, subfolder};
 
 /// A folder or file that cannot be written.
 #[derive(Debug, thiserror::Error)]
@@ -119,7 +119,7 @@ impl OutputFolder {
         match old.first() {
             Some(first) if !overwrite => Err(OutputError::Exists { path: first.clone() }),
             _ => {
-                old.iter().try_for_each(std::fs::remove_file).map_err(unusable)?;
+                old.iter().try_for_each(remove_file).map_err(unusable)?;
                 Ok(folder)
             }
         }
@@ -133,8 +133,10 @@ impl OutputFolder {
         let folder = Self::unlocked(path)?;
         let folder = Self { lock: FolderLock::take(path, LOCK)?.map(Arc::new), ..folder };
         // A killed run may have left unfinished files.
-        let folders = [path.to_owned(), folder.frames()];
-        folders.iter().try_for_each(|path| remove_parts(path)).map_err(|source| {
+        let caches =
+            Some(path.join(Self::CACHES)).filter(|caches| caches.symlink_metadata().is_ok_and(|it| it.is_dir()));
+        let mut folders = [path.to_owned(), folder.frames()].into_iter().chain(caches);
+        folders.try_for_each(|path| remove_parts(&path)).map_err(|source| {
             let path = path.to_owned();
             OutputError::Folder { path, source }
         })?;
@@ -149,7 +151,7 @@ impl OutputFolder {
     pub fn unlocked(path: &Path) -> Result<Self, OutputError> {
         let folder = Self { path: path.to_owned(), lock: None };
         let unusable = |source| OutputError::Folder { path: path.to_owned(), source };
-        std::fs::create_dir_all(path).map_err(unusable)?;
+        create_folder(path).map_err(unusable)?;
         let frames = subfolder(path, Self::FRAMES).map_err(unusable)?;
         for probed in [path.to_owned(), frames] {
             PartFile::create(&probed.join("probe")).map_err(unusable)?;

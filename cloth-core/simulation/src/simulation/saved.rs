@@ -82,6 +82,9 @@ pub enum RestoreError {
         /// Vertices of the saved state.
         found: usize,
     },
+    /// The ledger of the state has other columns or islands than the scene.
+    #[error("the ledger of the checkpoint does not fit the scene")]
+    OtherLedger,
     /// The scene cannot be assembled without the pins that have let go.
     #[error("cannot release pins: {source}")]
     Release {
@@ -153,7 +156,11 @@ impl Simulation {
         let fits = expected == found && sizes == [expected, self.islands.len(), terms, terms];
         let known = saved.masses_checksum == masses_checksum(&self.masses)
             || self.controlled.earlier_masses.contains(&saved.masses_checksum);
-        if fits && known { Ok(()) } else { Err(RestoreError::OtherScene { expected, found }) }
+        match saved.ledger.as_ref().is_none_or(|ledger| ledger.fits(self.islands.len())) {
+            _ if !(fits && known) => Err(RestoreError::OtherScene { expected, found }),
+            false => Err(RestoreError::OtherLedger),
+            true => Ok(()),
+        }
     }
 }
 

@@ -96,7 +96,7 @@ impl SleepState {
             (*still_steps, *reference) = (0, v.to_vec());
             return false;
         }
-        *still_steps += 1;
+        *still_steps = still_steps.saturating_add(1);
         // Half a step of slack: rounding of dt must not cost a whole step.
         if (*still_steps as f64 + 0.5) * dt < stillness.duration {
             return false;

@@ -3,7 +3,6 @@
 mod audit;
 mod bench;
 mod eval;
-mod fuzz;
 mod output;
 mod policy;
 mod reference;
@@ -14,7 +13,6 @@ mod targets;
 pub use audit::Audit;
 pub use bench::Bench;
 pub use eval::Eval;
-pub use fuzz::Fuzz;
 pub use reference::Reference;
 pub use show::Show;
 pub use stress::Stress;
