@@ -42,9 +42,7 @@ fn struck() -> Option<Fault> {
 }
 
 /// Says so on standard error: a test must know that the operation was reached.
-/// Says so on standard error: a test must know that the operation was reached.
 fn strike<T>(fault: Fault) -> Result<T> {
-    eprintln!("fault at operation {}", PLANNED.map_or(0, |(_, at)| at));
     eprintln!("fault at operation {}", PLANNED.map_or(0, |(_, at)| at));
     match fault {
         // As a kill does: no destructor runs.
