@@ -27,7 +27,7 @@ const FORMULAS: [(&str, usize); 10] = [
         let s = sqrt(dot(d, u)^2 + dot(d, v)^2);
         λ * (if s < ε { s^2 / ε - s^3 / (3 * ε^2) + ε / 3 } else { s })
       }",
-        500,
+        260,
     ),
     // Gaps of two midpoints: six linear functions of twelve coordinates.
     (
@@ -49,7 +49,7 @@ const FORMULAS: [(&str, usize); 10] = [
         rest { let B = inverse(columns(X1 - X0, X2 - X0, X3 - X0)); }
         let F = columns(x1 - x0, x2 - x0, x3 - x0) * B; let G = inverse(F); μ * (ddot(F, F) + ddot(G, G))
       }",
-        1500,
+        1330,
     ),
     // ‖F − R‖² and tr S have closed second derivatives, however they are spelled.
     (

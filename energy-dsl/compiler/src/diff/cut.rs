@@ -24,15 +24,17 @@ pub(super) struct Gathered {
     pub(super) safe: bool,
 }
 
-/// Returns the derivatives through the nodes of a cut; `None` if that is not right on the ordinary path.
+/// Returns the derivatives through the nodes of a cut; `None` if that is not right on the ordinary path. Above the cut,
+/// they may be gathered at one of so many waists.
 pub(super) fn derivatives(
     g: &mut Graph,
     output: NodeId,
     cut: &[NodeId],
     coordinates: &Coordinates,
+    waists: usize,
 ) -> Option<Gathered> {
     let n = coordinates.len();
-    let Gathered { gradient: slopes, hessian: curvatures, safe } = by_cut(g, output, cut);
+    let Gathered { gradient: slopes, hessian: curvatures, safe } = by_cut(g, output, cut, waists);
     let safe = safe && adjoint::is_safe(g, cut, Order::Second, true);
     let weights: Weighted = cut.iter().copied().zip(slopes).collect();
     let gradient = adjoint::gradient(g, &weights, coordinates, Order::Second)?;
@@ -62,7 +64,7 @@ pub(super) fn derivatives(
 }
 
 /// Returns the derivatives of U with respect to the nodes of the cut. They may be gathered at a cut above.
-fn by_cut(g: &mut Graph, output: NodeId, cut: &[NodeId]) -> Gathered {
+fn by_cut(g: &mut Graph, output: NodeId, cut: &[NodeId], most: usize) -> Gathered {
     let coordinates = Coordinates::of_nodes(g, cut);
     let whole = adjoint::alone(g, output);
     let slopes = adjoint::gradient(g, &whole, &coordinates, Order::Second);
@@ -79,8 +81,8 @@ fn by_cut(g: &mut Graph, output: NodeId, cut: &[NodeId]) -> Gathered {
     if cut.len() < NESTED {
         return best;
     }
-    for waist in waists(g, output, &coordinates) {
-        if let Some(found) = derivatives(g, output, &waist, &coordinates)
+    for waist in waists(g, output, &coordinates, most) {
+        if let Some(found) = derivatives(g, output, &waist, &coordinates, (most - 1).max(FEWEST_WAISTS))
             && found.cost(g) < best.cost(g)
         {
             best = found;
@@ -119,28 +121,85 @@ fn linear_front(g: &Graph, output: NodeId, coordinates: &Coordinates) -> Option<
     (is_inner && front.len() > 1 && front.len() <= coordinates.len()).then(|| front.into_iter().collect())
 }
 
-/// Returns the narrowest parts of the graph between the coordinates and U, of those that are closest to the coordinates:
-/// one node, several, and linear functions of the coordinates.
-///
-/// Each node of a front is replaced by its operands, the last node first, so that any front is a cut.
-pub(super) fn waists(g: &Graph, output: NodeId, coordinates: &Coordinates) -> Vec<Vec<NodeId>> {
-    let is_inner = |front: &BTreeSet<NodeId>| front.iter().any(|node| !coordinates.seeds.contains_key(node));
-    let mut front = BTreeSet::from([output]);
-    let (mut single, mut several): (Option<Vec<NodeId>>, Option<Vec<NodeId>>) = (None, None);
-    while let Some(last) = front.iter().copied().rfind(|node| !coordinates.seeds.contains_key(node)) {
-        front.remove(&last);
-        front.extend(moving_operands(g, last, Order::Second).into_iter().filter(|&node| g.varies(node)));
-        let size = front.len();
-        let narrowest = several.as_ref().map_or(coordinates.len(), |cut| cut.len() + 1);
-        match size {
-            _ if !is_inner(&front) => {}
-            1 => (single, several) = (Some(front.iter().copied().collect()), None),
-            _ if size < narrowest => several = Some(front.iter().copied().collect()),
-            _ => {}
+/// Fronts of the graph between U and the coordinates. A node of a front is replaced by its operands once no other node
+/// that is above the coordinates uses it, so that any front is a cut.
+struct Fronts<'a> {
+    g: &'a Graph,
+    coordinates: &'a Coordinates,
+    front: BTreeSet<NodeId>,
+    /// Uses of each node by nodes that were not replaced.
+    users: BTreeMap<NodeId, usize>,
+}
+
+/// Nodes of a front that are compared, of those that may be replaced.
+const COMPARED: usize = 16;
+
+impl<'a> Fronts<'a> {
+    fn new(g: &'a Graph, output: NodeId, coordinates: &'a Coordinates) -> Self {
+        let mut fronts = Self { g, coordinates, front: BTreeSet::from([output]), users: BTreeMap::new() };
+        for node in differentiable(g, &[output], Order::Second) {
+            for operand in fronts.operands(node) {
+                *fronts.users.entry(operand).or_insert(0) += 1;
+            }
+        }
+        fronts
+    }
+
+    /// Returns the moving operands of a node, each once; none of a coordinate.
+    fn operands(&self, node: NodeId) -> BTreeSet<NodeId> {
+        if self.coordinates.seeds.contains_key(&node) {
+            return BTreeSet::new();
+        }
+        moving_operands(self.g, node, Order::Second).into_iter().filter(|&operand| self.g.varies(operand)).collect()
+    }
+
+    /// Replaces the node whose operands are the fewest that are new, of equals the last one. Returns whether there was
+    /// one.
+    fn advance(&mut self) -> bool {
+        let is_free =
+            |node: &&NodeId| !self.coordinates.seeds.contains_key(node) && self.users.get(node).is_none_or(|n| *n == 0);
+        let new = |node: &&NodeId| self.operands(**node).difference(&self.front).count();
+        let free = self.front.iter().rev().filter(is_free).take(COMPARED);
+        let Some(&next) = free.min_by_key(new) else { return false };
+        self.front.remove(&next);
+        for operand in self.operands(next) {
+            *self.users.entry(operand).or_insert(1) -= 1;
+            self.front.insert(operand);
+        }
+        true
+    }
+
+    fn is_inner(&self) -> bool {
+        self.front.iter().any(|node| !self.coordinates.seeds.contains_key(node))
+    }
+}
+
+/// The most waists of a formula, but for the linear one. Above a cut there is one less, down to the fewest.
+pub(super) const WAISTS: usize = 5;
+const FEWEST_WAISTS: usize = 3;
+/// The most products ∇c ∇cᵀ of a waist. More take long to write down.
+const MOST_PRODUCTS: usize = 1_000_000;
+
+/// Returns the narrow parts of the graph between the coordinates and U: fronts that are narrower than all that are
+/// closer to the coordinates, and linear functions of the coordinates. Of many, it returns those of few nodes and the one
+/// that is closest to the coordinates.
+pub(super) fn waists(g: &Graph, output: NodeId, coordinates: &Coordinates, most: usize) -> Vec<Vec<NodeId>> {
+    let widest = (MOST_PRODUCTS / coordinates.len().pow(2).max(1)).min(coordinates.len().saturating_sub(1));
+    let mut fronts = Fronts::new(g, output, coordinates);
+    let mut waists: Vec<Vec<NodeId>> = Vec::new();
+    while fronts.advance() {
+        let size = fronts.front.len();
+        if fronts.is_inner() && size <= widest {
+            waists.retain(|waist| waist.len() < size);
+            waists.push(fronts.front.iter().copied().collect());
         }
     }
-    let linear = linear_front(g, output, coordinates).filter(|cut| several.as_ref() != Some(cut));
-    single.into_iter().chain(several).chain(linear).collect()
+    if let Some(last) = waists.len().checked_sub(1).filter(|&last| last >= most) {
+        waists.swap(most - 1, last);
+        waists.truncate(most);
+    }
+    let linear = linear_front(g, output, coordinates).filter(|cut| !waists.contains(cut));
+    waists.into_iter().chain(linear).collect()
 }
 
 /// Returns the robust primitives that depend on no other one, if every path from the coordinates to U leads through
