@@ -15,6 +15,7 @@ use crate::graph::{Graph, NodeId, Op, count, ordinary};
 const NESTED: usize = 3;
 
 /// Derivatives gathered at a cut.
+#[derive(Clone)]
 pub(super) struct Gathered {
     /// ∇U.
     pub(super) gradient: Vec<NodeId>,
@@ -24,17 +25,20 @@ pub(super) struct Gathered {
     pub(super) safe: bool,
 }
 
+/// Derivatives of U with respect to the nodes of cuts, by the cut.
+pub(super) type ByCut = BTreeMap<Vec<NodeId>, Gathered>;
+
 /// Returns the derivatives through the nodes of a cut; `None` if that is not right on the ordinary path. Above the cut,
-/// they may be gathered at one of so many waists.
+/// they may be gathered at a waist.
 pub(super) fn derivatives(
     g: &mut Graph,
     output: NodeId,
     cut: &[NodeId],
     coordinates: &Coordinates,
-    waists: usize,
+    known: &mut ByCut,
 ) -> Option<Gathered> {
     let n = coordinates.len();
-    let Gathered { gradient: slopes, hessian: curvatures, safe } = by_cut(g, output, cut, waists);
+    let Gathered { gradient: slopes, hessian: curvatures, safe } = by_cut(g, output, cut, known);
     let safe = safe && adjoint::is_safe(g, cut, Order::Second, true);
     let weights: Weighted = cut.iter().copied().zip(slopes).collect();
     let gradient = adjoint::gradient(g, &weights, coordinates, Order::Second)?;
@@ -64,7 +68,16 @@ pub(super) fn derivatives(
 }
 
 /// Returns the derivatives of U with respect to the nodes of the cut. They may be gathered at a cut above.
-fn by_cut(g: &mut Graph, output: NodeId, cut: &[NodeId], most: usize) -> Gathered {
+fn by_cut(g: &mut Graph, output: NodeId, cut: &[NodeId], known: &mut ByCut) -> Gathered {
+    if let Some(found) = known.get(cut) {
+        return found.clone();
+    }
+    let found = best_by_cut(g, output, cut, known);
+    known.insert(cut.to_vec(), found.clone());
+    found
+}
+
+fn best_by_cut(g: &mut Graph, output: NodeId, cut: &[NodeId], known: &mut ByCut) -> Gathered {
     let coordinates = Coordinates::of_nodes(g, cut);
     let whole = adjoint::alone(g, output);
     let slopes = adjoint::gradient(g, &whole, &coordinates, Order::Second);
@@ -81,8 +94,8 @@ fn by_cut(g: &mut Graph, output: NodeId, cut: &[NodeId], most: usize) -> Gathere
     if cut.len() < NESTED {
         return best;
     }
-    for waist in waists(g, output, &coordinates, most) {
-        if let Some(found) = derivatives(g, output, &waist, &coordinates, (most - 1).max(FEWEST_WAISTS))
+    for waist in waists(g, output, &coordinates) {
+        if let Some(found) = derivatives(g, output, &waist, &coordinates, known)
             && found.cost(g) < best.cost(g)
         {
             best = found;
@@ -174,16 +187,15 @@ impl<'a> Fronts<'a> {
     }
 }
 
-/// The most waists of a formula, but for the linear one. Above a cut there is one less, down to the fewest.
-pub(super) const WAISTS: usize = 5;
-const FEWEST_WAISTS: usize = 3;
+/// The most waists of a formula, but for the linear one.
+const MOST_WAISTS: usize = 5;
 /// The most products ∇c ∇cᵀ of a waist. More take long to write down.
 const MOST_PRODUCTS: usize = 1_000_000;
 
 /// Returns the narrow parts of the graph between the coordinates and U: fronts that are narrower than all that are
 /// closer to the coordinates, and linear functions of the coordinates. Of many, it returns those of few nodes and the one
 /// that is closest to the coordinates.
-pub(super) fn waists(g: &Graph, output: NodeId, coordinates: &Coordinates, most: usize) -> Vec<Vec<NodeId>> {
+pub(super) fn waists(g: &Graph, output: NodeId, coordinates: &Coordinates) -> Vec<Vec<NodeId>> {
     let widest = (MOST_PRODUCTS / coordinates.len().pow(2).max(1)).min(coordinates.len().saturating_sub(1));
     let mut fronts = Fronts::new(g, output, coordinates);
     let mut waists: Vec<Vec<NodeId>> = Vec::new();
@@ -194,9 +206,9 @@ pub(super) fn waists(g: &Graph, output: NodeId, coordinates: &Coordinates, most:
             waists.push(fronts.front.iter().copied().collect());
         }
     }
-    if let Some(last) = waists.len().checked_sub(1).filter(|&last| last >= most) {
-        waists.swap(most - 1, last);
-        waists.truncate(most);
+    if let Some(last) = waists.len().checked_sub(1).filter(|&last| last >= MOST_WAISTS) {
+        waists.swap(MOST_WAISTS - 1, last);
+        waists.truncate(MOST_WAISTS);
     }
     let linear = linear_front(g, output, coordinates).filter(|cut| !waists.contains(cut));
     waists.into_iter().chain(linear).collect()

@@ -112,9 +112,10 @@ pub fn second_order(
         }
     }
     let primitives = cut::primitives(g, value, coordinates).map(|cut| ("gathered at primitives", cut));
-    let waists = cut::waists(g, value, coordinates, cut::WAISTS).into_iter().map(|cut| ("gathered at a waist", cut));
+    let waists = cut::waists(g, value, coordinates).into_iter().map(|cut| ("gathered at a waist", cut));
+    let mut by_cut = cut::ByCut::new();
     for (name, cut) in primitives.into_iter().chain(waists) {
-        if let Some(found) = cut::derivatives(g, value, &cut, coordinates, cut::WAISTS - 1) {
+        if let Some(found) = cut::derivatives(g, value, &cut, coordinates, &mut by_cut) {
             offer(name, &found.gradient, &dense(found.hessian), found.safe);
         }
     }
