@@ -32,7 +32,7 @@ fn plan_of_motion(formula: &str) -> String {
 fn plan_of(source: &str) -> String {
     let code = compile(source.parse().unwrap()).to_string();
     assert!(!code.contains("compile_error"), "{source}");
-    let (_, plan) = code.split_once("primitives : &").unwrap();
+    let (_, plan) = code.split_once("primitives :").unwrap();
     plan.split_once("} ;").unwrap().0.to_owned()
 }
 

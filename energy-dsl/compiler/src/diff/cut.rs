@@ -25,8 +25,26 @@ pub(super) struct Gathered {
     pub(super) safe: bool,
 }
 
-/// Derivatives of U with respect to the nodes of cuts, by the cut.
-pub(super) type ByCut = BTreeMap<Vec<NodeId>, Gathered>;
+/// Derivatives of U with respect to the nodes of cuts.
+pub(super) struct ByCut {
+    known: BTreeMap<Vec<NodeId>, Gathered>,
+    /// Steps of the compiler after which no more cuts are looked for.
+    last_step: u64,
+}
+
+/// Steps of the compiler that are spent on cuts. A formula without order has ever new ones.
+const STEPS: u64 = 2_000_000;
+
+impl ByCut {
+    pub(super) fn new(g: &Graph) -> Self {
+        Self { known: BTreeMap::new(), last_step: g.budget().progress().steps.saturating_add(STEPS) }
+    }
+
+    /// Returns whether there are steps left.
+    pub(super) fn goes_on(&self, g: &Graph) -> bool {
+        g.budget().progress().steps < self.last_step
+    }
+}
 
 /// Returns the derivatives through the nodes of a cut; `None` if that is not right on the ordinary path. Above the cut,
 /// they may be gathered at a waist.
@@ -69,15 +87,9 @@ pub(super) fn derivatives(
 
 /// Returns the derivatives of U with respect to the nodes of the cut. They may be gathered at a cut above.
 fn by_cut(g: &mut Graph, output: NodeId, cut: &[NodeId], known: &mut ByCut) -> Gathered {
-    if let Some(found) = known.get(cut) {
+    if let Some(found) = known.known.get(cut) {
         return found.clone();
     }
-    let found = best_by_cut(g, output, cut, known);
-    known.insert(cut.to_vec(), found.clone());
-    found
-}
-
-fn best_by_cut(g: &mut Graph, output: NodeId, cut: &[NodeId], known: &mut ByCut) -> Gathered {
     let coordinates = Coordinates::of_nodes(g, cut);
     let whole = adjoint::alone(g, output);
     let slopes = adjoint::gradient(g, &whole, &coordinates, Order::Second);
@@ -91,16 +103,20 @@ fn best_by_cut(g: &mut Graph, output: NodeId, cut: &[NodeId], known: &mut ByCut)
             Gathered { gradient, hessian: forward::second_derivatives(g, output, &coordinates), safe: true }
         }
     };
-    if cut.len() < NESTED {
-        return best;
-    }
-    for waist in waists(g, output, &coordinates) {
-        if let Some(found) = derivatives(g, output, &waist, &coordinates, known)
-            && found.cost(g) < best.cost(g)
-        {
-            best = found;
+    let waists = if cut.len() < NESTED { Vec::new() } else { waists(g, output, &coordinates) };
+    let mut least = best.cost(g);
+    for waist in waists {
+        if !known.goes_on(g) {
+            break;
+        }
+        if let Some(found) = derivatives(g, output, &waist, &coordinates, known) {
+            let cost = found.cost(g);
+            if cost < least {
+                (best, least) = (found, cost);
+            }
         }
     }
+    known.known.insert(cut.to_vec(), best.clone());
     best
 }
 

@@ -113,8 +113,11 @@ pub fn second_order(
     }
     let primitives = cut::primitives(g, value, coordinates).map(|cut| ("gathered at primitives", cut));
     let waists = cut::waists(g, value, coordinates).into_iter().map(|cut| ("gathered at a waist", cut));
-    let mut by_cut = cut::ByCut::new();
+    let mut by_cut = cut::ByCut::new(g);
     for (name, cut) in primitives.into_iter().chain(waists) {
+        if !by_cut.goes_on(g) {
+            break;
+        }
         if let Some(found) = cut::derivatives(g, value, &cut, coordinates, &mut by_cut) {
             offer(name, &found.gradient, &dense(found.hessian), found.safe);
         }
