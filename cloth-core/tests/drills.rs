@@ -97,13 +97,13 @@ fn kills(arguments: fn(&Path) -> Vec<String>) {
 }
 
 #[test]
-#[ignore = "as many kills as DRILL_KILLS says"]
+#[ignore = "takes minutes: as many kills as DRILL_KILLS says, at random times"]
 fn killed_runs_continue() {
     kills(run);
 }
 
 #[test]
-#[ignore = "as many kills as DRILL_KILLS says"]
+#[ignore = "takes minutes: as many kills as DRILL_KILLS says, at random times"]
 fn killed_sweeps_continue() {
     kills(sweep);
 }

@@ -30,7 +30,11 @@ pub(crate) struct Read(Interpreted);
 
 impl Read {
     pub(crate) fn new<E: Element>() -> Self {
-        Self(Interpreted::from_source(&E::DECLARATION.source).unwrap().pop().unwrap())
+        Self::of_text(&E::DECLARATION.source)
+    }
+
+    fn of_text(source: &str) -> Self {
+        Self(Interpreted::from_source(source).unwrap().pop().unwrap())
     }
 
     /// Returns a term of equal elements, each with its own points.
@@ -156,6 +160,26 @@ fn barriers_and_powers() {
             check(|| barrier.term(COUNT, &[], &[2.0, near]), &x)?;
         }
         check(|| power.term(COUNT, &[], &[near]), &x)
+    });
+}
+
+/// Entries of a Hessian that are constant, or equal to others, may differ from them once it is projected.
+#[test]
+fn equal_and_constant_entries() {
+    let of_two = [
+        "let a = x1 - x0; let b = x2 - x0; k * ((norm(a + 2 * b) - 1)^2 + (norm(2 * a - b) - 1.5)^2)",
+        "k * dot(x1 - x0, x2 - x0)^3",
+        "k * (dot(x1 - x0, x2 - x1) - norm_squared(x2 - x0) * norm(x1 - x0))",
+        "let a = x1 - x0; let b = x2 - x0; k * (a.x * b.y + sin(a.z))",
+    ];
+    let of_two = of_two.map(|text| Read::of_text(&format!("energy Two(x0, x1, x2: Point; k: Scalar) {{ {text} }}")));
+    let volume = "energy Volume(x0, x1, x2, x3: Point; k: Scalar) { k * det(columns(x1 - x0, x2 - x0, x3 - x0)) }";
+    let volume = Read::of_text(volume);
+    on_random(&(points::<3>(), points::<4>(), 0.5..2.0_f64), |(two, three, k)| {
+        for element in &of_two {
+            check(|| element.term(COUNT, &[], &[k]), &two)?;
+        }
+        check(|| volume.term(COUNT, &[], &[k]), &three)
     });
 }
 

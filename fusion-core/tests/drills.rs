@@ -52,7 +52,7 @@ fn every_failure_of_a_track_is_told_and_mended() {
 }
 
 #[test]
-#[ignore = "as many kills as DRILL_KILLS says"]
+#[ignore = "takes minutes: as many kills as DRILL_KILLS says, at random times"]
 fn killed_tracks_continue() {
     let number = |name: &str, usual: u64| {
         std::env::var(name).map_or(usual, |text| text.parse().unwrap_or_else(|_| panic!("{name} is not a number")))

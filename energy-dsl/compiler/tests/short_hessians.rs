@@ -49,7 +49,7 @@ const FORMULAS: [(&str, usize); 10] = [
         rest { let B = inverse(columns(X1 - X0, X2 - X0, X3 - X0)); }
         let F = columns(x1 - x0, x2 - x0, x3 - x0) * B; let G = inverse(F); μ * (ddot(F, F) + ddot(G, G))
       }",
-        1700,
+        1330,
     ),
     // ‖F − R‖² and tr S have closed second derivatives, however they are spelled.
     (
@@ -58,7 +58,7 @@ const FORMULAS: [(&str, usize); 10] = [
         let F = columns(x1 - x0, x2 - x0, x3 - x0) * B; let R = rotation_of(F);
         μ * ddot(F - R, F - R) + λ / 2 * (trace(transpose(R) * F) - 3)^2
       }",
-        3300,
+        2300,
     ),
     (
         "energy CorotatedStrain(x0, x1, x2, x3: Point; rest X0, X1, X2, X3: Point; μ, λ: Scalar) {
@@ -66,7 +66,7 @@ const FORMULAS: [(&str, usize); 10] = [
         let F = columns(x1 - x0, x2 - x0, x3 - x0) * B;
         let E = transpose(rotation_of(F)) * F - identity(3); μ * ddot(E, E) + λ / 2 * trace(E)^2
       }",
-        3300,
+        2300,
     ),
     // Entries of R are weighted before they are differentiated: 45 sums instead of 9 times 45.
     (

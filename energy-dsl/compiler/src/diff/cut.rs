@@ -147,7 +147,7 @@ fn linear_front(g: &Graph, output: NodeId, coordinates: &Coordinates) -> Option<
         }
     }
     let is_inner = front.iter().any(|node| !coordinates.seeds.contains_key(node));
-    (is_inner && front.len() > 1 && front.len() < coordinates.len()).then(|| front.into_iter().collect())
+    (is_inner && front.len() > 1 && front.len() <= coordinates.len()).then(|| front.into_iter().collect())
 }
 
 /// Fronts of the graph between U and the coordinates. A node of a front is replaced by its operands once no other node

@@ -216,17 +216,25 @@ pub struct Expansion {
 }
 
 impl Expansion {
-    /// Creates the expansion. Numbers that are zero or equal in the reduced routine are so here.
+    /// Creates the expansion. Derivatives that are constant or equal in the reduced gradient are so here. Entries of the
+    /// reduced Hessian are not, unless all are 0: a projection to a semi-definite matrix may change them in between.
     fn new(g: &Graph, energy: &SecondOrder, coordinates: &Coordinates, points: usize) -> Self {
         let mut graph = Graph::textbook().paid_by(g.budget());
         let all: Vec<NodeId> = energy.gradient.iter().chain(&energy.hessian).map(|&node| g.resolve(node)).collect();
+        let projected = match all[energy.gradient.len()..].iter().all(|&entry| g.is(entry, 0.0)) {
+            true => all.len(),
+            false => energy.gradient.len(),
+        };
         let mut first = FxHashMap::default();
         let numbers: Vec<NodeId> = all
             .iter()
             .enumerate()
             .map(|(number, &node)| match g.as_constant(node) {
-                Some(value) => graph.constant(value),
-                None => graph.input(Input::Precomputed(Budget::input_number(*first.entry(node).or_insert(number)))),
+                Some(value) if number < projected => graph.constant(value),
+                _ => {
+                    let source = if number < projected { *first.entry(node).or_insert(number) } else { number };
+                    graph.input(Input::Precomputed(Budget::input_number(source)))
+                }
             })
             .collect();
         let (gradient, triangle) = numbers.split_at(energy.gradient.len());

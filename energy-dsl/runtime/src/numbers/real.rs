@@ -149,6 +149,7 @@ pub trait Number:
     /// Returns self < other.
     fn less(self, other: Self) -> Self::Mask;
     /// Returns self < other, where results are the same for both outcomes.
+    #[inline(always)]
     fn precedes(self, other: Self) -> Self::Mask {
         self.less(other)
     }
