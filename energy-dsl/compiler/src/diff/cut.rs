@@ -127,7 +127,7 @@ impl Gathered {
     }
 }
 
-/// Returns the linear functions of the coordinates that U is computed from, if they are fewer than the coordinates.
+/// Returns the linear functions of the coordinates that U is computed from, unless they are more than the coordinates.
 fn linear_front(g: &Graph, output: NodeId, coordinates: &Coordinates) -> Option<Vec<NodeId>> {
     let mut linear: BTreeSet<NodeId> = BTreeSet::new();
     let mut front: BTreeSet<NodeId> = BTreeSet::new();

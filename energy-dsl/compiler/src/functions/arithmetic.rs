@@ -128,7 +128,7 @@ fn sub(g: &mut Graph, args: &[Lowered]) -> Lowered {
         return recognised;
     }
     let difference = by_parts(g, args, Graph::sub);
-    if matches!(g.origin(&args[1].parts), Some(Origin::Rotation { matrix }) if *matrix == args[0].parts) {
+    if matches!(g.origin(&args[1].parts), Some(Origin::Rotation { matrix, .. }) if *matrix == args[0].parts) {
         g.note_origin(&difference.parts, Origin::Unrotated { matrix: args[0].parts.clone() });
     }
     if let Some(Origin::Stretch { trace, matrix }) = g.origin(&args[0].parts).cloned()

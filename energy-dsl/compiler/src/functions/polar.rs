@@ -44,8 +44,8 @@ pub(super) fn deformation(shapes: &[Shape]) -> Result<u8, String> {
 
 fn rotation(g: &mut Graph, f: &Lowered) -> Lowered {
     if f.dimensions() == (3, 3) {
-        let rotation = polar(g, f).rotation;
-        g.note_origin(&rotation, Origin::Rotation { matrix: f.parts.clone() });
+        let Polar { rotation, trace } = polar(g, f);
+        g.note_origin(&rotation, Origin::Rotation { trace, matrix: f.parts.clone() });
         return Lowered::matrix(3, 3, rotation);
     }
     let columns = orthonormal_columns(g, f);
@@ -87,11 +87,20 @@ fn columns(f: &Lowered) -> [Lowered; 2] {
 
 fn stretch(g: &mut Graph, f: &Lowered) -> Lowered {
     if f.dimensions() == (3, 3) {
-        return spatial_stretch(g, f);
+        let polar = polar(g, f);
+        return spatial_stretch(g, f, polar);
     }
     let ([a, b], [r, s]) = (columns(f), orthonormal_columns(g, f));
     let (first, mixed, last) = (g.dot(&r.parts, &a.parts), g.dot(&r.parts, &b.parts), g.dot(&s.parts, &b.parts));
     Lowered::matrix(2, 2, vec![first, mixed, mixed, last])
+}
+
+/// Returns tr S if R is the rotation of F.
+fn trace_of_stretch(g: &Graph, r: &[NodeId], f: &Lowered) -> Option<NodeId> {
+    match g.origin(r) {
+        Some(Origin::Rotation { trace, matrix }) if *matrix == f.parts => Some(*trace),
+        _ => None,
+    }
 }
 
 /// Recognises the product RᵀF, which is S.
@@ -100,19 +109,17 @@ pub(super) fn recognise_stretch(g: &mut Graph, a: &Lowered, f: &Lowered) -> Opti
         return None;
     }
     let rotation: Vec<NodeId> = (0..9).map(|e| a.at(e % 3, e / 3)).collect();
-    let is_own = matches!(g.origin(&rotation), Some(Origin::Rotation { matrix }) if *matrix == f.parts);
-    is_own.then(|| spatial_stretch(g, f))
+    let trace = trace_of_stretch(g, &rotation, f)?;
+    Some(spatial_stretch(g, f, Polar { rotation, trace }))
 }
 
 /// Recognises ⟨R, F⟩, which is tr S.
-pub(super) fn recognise_stretch_trace(g: &mut Graph, r: &Lowered, f: &Lowered) -> Option<Lowered> {
-    let is_own = matches!(g.origin(&r.parts), Some(Origin::Rotation { matrix }) if *matrix == f.parts);
-    is_own.then(|| Lowered::scalar(polar(g, f).trace))
+pub(super) fn recognise_stretch_trace(g: &Graph, r: &Lowered, f: &Lowered) -> Option<Lowered> {
+    trace_of_stretch(g, &r.parts, f).map(Lowered::scalar)
 }
 
 /// Returns S = RᵀF of a 3×3 matrix, as the mean with its transpose.
-fn spatial_stretch(g: &mut Graph, f: &Lowered) -> Lowered {
-    let Polar { rotation, trace } = polar(g, f);
+fn spatial_stretch(g: &mut Graph, f: &Lowered, Polar { rotation, trace }: Polar) -> Lowered {
     let column = |parts: &[NodeId], j: usize| [parts[j], parts[3 + j], parts[6 + j]];
     let entry = |g: &mut Graph, i: usize, j: usize| g.dot(&column(&rotation, i), &column(&f.parts, j));
     let half = g.constant(0.5);

@@ -15,8 +15,8 @@ pub(crate) enum Origin {
     UnitQuaternion,
     /// The symmetric factor S of F = R S, with its trace and det S = det F.
     Stretch { trace: NodeId, matrix: Vec<NodeId> },
-    /// The rotation R of F = R S.
-    Rotation { matrix: Vec<NodeId> },
+    /// The rotation R of F = R S, with the trace of S.
+    Rotation { trace: NodeId, matrix: Vec<NodeId> },
     /// F − R of F = R S.
     Unrotated { matrix: Vec<NodeId> },
     /// S − I of F = R S, with the trace of S.

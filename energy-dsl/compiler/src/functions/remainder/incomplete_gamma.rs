@@ -4,7 +4,7 @@
 
 use super::super::exponential::expm1;
 use super::monomial::{Monomial, lengths};
-use super::recognise::{LARGEST_ORDER, MOST_TERMS, SAME, factors};
+use super::recognise::{LARGEST_ORDER, SAME, factors, leaves};
 use super::series::{constant_term, whole_remainder};
 use crate::graph::{Expansion, Graph, NodeId, Op, Primitive};
 
@@ -47,23 +47,6 @@ fn order(g: &Graph, node: NodeId, x: NodeId, opposite: NodeId) -> Option<(u32, f
         }
         _ => None,
     }
-}
-
-/// Returns the terms of a sum and their signs; `None` if there are many.
-fn leaves(g: &Graph, mut open: Vec<(NodeId, f64)>) -> Option<Vec<(NodeId, f64)>> {
-    let mut found = Vec::new();
-    while let Some((node, sign)) = open.pop() {
-        match g.op(node) {
-            Op::Add(a, b) => open.extend([(a, sign), (b, sign)]),
-            Op::Sub(a, b) => open.extend([(a, sign), (b, -sign)]),
-            Op::Neg(a) => open.push((a, -sign)),
-            _ => found.push((node, sign)),
-        }
-        if found.len() + open.len() > MOST_TERMS {
-            return None;
-        }
-    }
-    Some(found)
 }
 
 /// 1 − e⁻ˣ q(x).
@@ -125,27 +108,20 @@ impl Damped {
             }
             _ => whole_remainder(g, Expansion::IncompleteGamma, order, x),
         };
-        let rest: Vec<NodeId> = rest
-            .into_iter()
-            .map(|(power, coefficient)| {
-                let (power, coefficient) = (g.constant(f64::from(power)), g.constant(coefficient));
-                let power = g.pow(x, power);
-                g.mul(coefficient, power)
-            })
-            .collect();
-        if rest.is_empty() {
-            return whole;
-        }
-        let polynomial = g.sum(rest);
-        let damped = g.mul(exponential, polynomial);
-        g.plain_difference(whole, damped)
+        // Term by term: a divisor may cancel a power of x in each.
+        rest.into_iter().fold(whole, |sum, (power, coefficient)| {
+            let (power, coefficient) = (g.constant(f64::from(power)), g.constant(coefficient));
+            let power = g.pow(x, power);
+            let factor = g.mul(coefficient, power);
+            let term = g.mul(factor, exponential);
+            g.plain_difference(sum, term)
+        })
     }
 }
 
 /// Multiplies out a sum among the factors of a product.
 fn expanded(g: &Graph, product: Monomial, lengths: &[NodeId]) -> Option<Vec<Monomial>> {
-    let is_sum = |factor: &NodeId| matches!(g.op(*factor), Op::Add(..) | Op::Sub(..)) && !lengths.contains(factor);
-    let Some(sum) = product.powers.keys().copied().find(is_sum) else { return Some(vec![product]) };
+    let Some(sum) = product.sum(g, lengths) else { return Some(vec![product]) };
     let rest = product.without_power(sum)?;
     let term = |(node, sign): (NodeId, f64)| rest.times(&Monomial::of(g, node, lengths).scaled(sign), 1);
     Some(leaves(g, vec![(sum, 1.0)])?.into_iter().map(term).collect())

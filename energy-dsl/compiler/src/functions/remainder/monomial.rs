@@ -75,6 +75,12 @@ impl Monomial {
         (self.powers.remove(&node)? == 1).then_some(self)
     }
 
+    /// Returns a sum among the factors.
+    pub(super) fn sum(&self, g: &Graph, lengths: &[NodeId]) -> Option<NodeId> {
+        let is_sum = |factor: &NodeId| matches!(g.op(*factor), Op::Add(..) | Op::Sub(..)) && !lengths.contains(factor);
+        self.powers.keys().copied().find(is_sum)
+    }
+
     /// Returns the power of another monomial that this is, up to a number, and the number; `None` if it is not one.
     pub(super) fn as_power_of(&self, other: &Self) -> Option<(u32, f64)> {
         let power = match self.powers.first_key_value() {

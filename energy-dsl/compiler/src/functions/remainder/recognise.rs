@@ -87,6 +87,23 @@ fn functions_in(g: &Graph, sum: &[(NodeId, f64)]) -> Vec<Function> {
     found
 }
 
+/// Returns the terms of a sum and their signs; `None` if there are many.
+pub(super) fn leaves(g: &Graph, mut open: Vec<(NodeId, f64)>) -> Option<Vec<(NodeId, f64)>> {
+    let mut found = Vec::new();
+    while let Some((node, sign)) = open.pop() {
+        match g.op(node) {
+            Op::Add(a, b) => open.extend([(a, sign), (b, sign)]),
+            Op::Sub(a, b) => open.extend([(a, sign), (b, -sign)]),
+            Op::Neg(a) => open.push((a, -sign)),
+            _ => found.push((node, sign)),
+        }
+        if found.len() + open.len() > MOST_TERMS {
+            return None;
+        }
+    }
+    Some(found)
+}
+
 /// Adds the functions among the factors of a product.
 fn functions_of(g: &Graph, product: NodeId, found: &mut Vec<Function>) {
     found.extend(factors(g, product).into_iter().filter_map(|factor| function(g, factor)));
@@ -204,7 +221,28 @@ pub(in super::super) fn recognise_quotient(g: &mut Graph, above: NodeId, below: 
         let factor = factor.build(g);
         return Some(g.mul(factor, rest));
     }
-    without_common_factor(g, above, below)
+    without_common_factor(g, above, below).or_else(|| term_by_term(g, above, below))
+}
+
+/// Divides each term of a sum that is a factor of `above`, if the divisor cancels in all of them and one is a function
+/// with a zero.
+fn term_by_term(g: &mut Graph, above: NodeId, below: NodeId) -> Option<NodeId> {
+    let product = Monomial::of(g, above, &[]);
+    let sum = product.sum(g, &[])?;
+    let terms = leaves(g, vec![(sum, 1.0)])?;
+    let mut functions = Vec::new();
+    terms.iter().for_each(|&(term, _)| functions_of(g, term, &mut functions));
+    if !functions.iter().any(|function| function.k > 0) {
+        return None;
+    }
+    let rest = product.without_power(sum)?.build(g);
+    let quotient = |(term, sign): (NodeId, f64)| {
+        let above = g.mul(rest, term);
+        let quotient = recognise_quotient(g, above, below)?;
+        Some(if sign < 0.0 { g.neg(quotient) } else { quotient })
+    };
+    let quotients: Option<Vec<NodeId>> = terms.into_iter().map(quotient).collect();
+    quotients.map(|quotients| g.sum(quotients))
 }
 
 /// Cancels a factor that vanishes on both sides at the same inputs. The quotient has the limit there, but its derivatives
