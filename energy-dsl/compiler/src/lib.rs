@@ -2,7 +2,7 @@
 //! their values and their exact first and second derivatives.
 //!
 //! ```text
-//! text ─ syntax ─► tree ─ check ─► typed program ─ lower ─► graph ─ diff ─► routines ─ prove ─► ─ emit ─► Rust
+//! text ─ syntax ─► tree ─ check ─► typed program ─ lower ─► graph ─ diff ─► routines ─ plan ─► ─ emit ─► Rust
 //! ```
 //!
 //! Users declare elements with `energy!` of the crate `energy-dsl`. This crate is for tools: [`compile`] is all that
@@ -20,9 +20,9 @@ mod inspect;
 mod interpreted;
 mod lower;
 mod passes;
+mod plan;
 mod properties;
 mod routines;
-mod statements;
 mod syntax;
 mod tape;
 

@@ -11,6 +11,7 @@ use crate::diagnostic::{self, Diagnostic, Diagnostics};
 use crate::emit::emit;
 use crate::inspect::write_code;
 use crate::lower::lower;
+use crate::plan::Plan;
 use crate::properties::prove;
 use crate::routines::differentiate;
 use crate::syntax;
@@ -69,7 +70,7 @@ fn compile_items(items: &[syntax::Item], mut diagnostics: Diagnostics) -> TokenS
 fn compile_program(program: &Program, diagnostics: &mut Diagnostics) -> TokenStream {
     let routines = differentiate(program, lower(program));
     prove(program, &routines, program.audit_samples.is_some(), diagnostics);
-    let items = emit(program, &routines);
+    let items = emit(program, &Plan::new(program, &routines));
     if let Some(folder) = std::env::var_os("ENERGY_DUMP_DIR").map(PathBuf::from)
         && let Err(error) = write_code(&folder, &program.name, &items)
     {

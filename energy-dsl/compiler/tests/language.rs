@@ -172,6 +172,8 @@ fn right_units_are_accepted() {
         "force A(_p: Point, v: Velocity; c: Scalar[N s/m]) { -c * v }",
         "residual A(ξ: Twist; p: Vec3[m]) { vector(norm(p), angular(ξ).x, dot(linear(ξ), p)) }",
         "constraint A(p, q: Point; L: Scalar[m]) { [norm(p - q) - L, dot(p, q) / L^2] }",
+        // Singular values have the unit of their matrix.
+        "energy A(p, q: Point; k: Scalar[N/m]) { let σ = singular_values(outer(p, vector(1, 0)) + outer(q, vector(0, 1))); k * σ.x^2 }",
         // Without units there is nothing to check.
         "energy A(p, q: Point; α: Scalar[1]) { norm(p - q)^α + sin(norm(p)) }",
     ] {

@@ -12,7 +12,9 @@ mod evaluate;
 #[cfg(feature = "nalgebra")]
 pub mod interop;
 mod numbers;
+mod operations;
 mod results;
+mod routine;
 pub mod tape;
 
 #[doc(hidden)]
@@ -46,3 +48,4 @@ pub use results::{
     ConstraintHessian, ConstraintJacobian, ForceJacobians, ForceValue, Gradient, Hessian, HessianVector,
     ReducedHessian, ResidualJacobian, ResidualValue, Value,
 };
+pub use routine::RoutineKind;

@@ -11,7 +11,9 @@ use std::time::{Duration, Instant};
 
 use energy_compiler::{Elements, InputKind, InputNumbers, Interpreted};
 use energy_dsl::tape::{Column, Output, Places, TapeElements, stencil_blocks};
-use energy_dsl::{Declaration, Inputs, Kind, Packed, PackedForce, PackedPotential, PackedResidual, Vector3};
+use energy_dsl::{
+    Declaration, Inputs, Kind, Packed, PackedForce, PackedPotential, PackedResidual, RoutineKind, Vector3,
+};
 use energy_elements::*;
 
 /// Elements per call.
@@ -167,7 +169,7 @@ fn potential<E: PackedPotential<f64, Wide<f64> = E>>() -> Vec<Line> {
         || drop(black_box(packed.values(all.clone(), black_box(x), e0))),
         || {
             let outputs = &mut [output(&value, e1)];
-            drop(black_box(case.tape.evaluate("value", all.clone(), black_box(places), None, outputs)));
+            drop(black_box(case.tape.evaluate(RoutineKind::Value, all.clone(), black_box(places), None, outputs)));
         },
     )];
     assert_same(&lines, &[(e0, e1)]);
@@ -176,7 +178,7 @@ fn potential<E: PackedPotential<f64, Wide<f64> = E>>() -> Vec<Line> {
         || drop(black_box(packed.gradients(all.clone(), black_box(x), e0, g0))),
         || {
             let outputs = &mut [output(&value, e1), output(&gradient, g1)];
-            drop(black_box(case.tape.evaluate("gradient", all.clone(), black_box(places), None, outputs)));
+            drop(black_box(case.tape.evaluate(RoutineKind::Gradient, all.clone(), black_box(places), None, outputs)));
         },
     ));
     assert_same(&lines, &[(e0, e1), (g0, g1)]);
@@ -185,7 +187,7 @@ fn potential<E: PackedPotential<f64, Wide<f64> = E>>() -> Vec<Line> {
         || drop(black_box(packed.hessians(all.clone(), black_box(x), e0, g0, h0))),
         || {
             let outputs = &mut [output(&value, e1), output(&gradient, g1), output(&upper, h1)];
-            drop(black_box(case.tape.evaluate("hessian", all.clone(), black_box(places), None, outputs)));
+            drop(black_box(case.tape.evaluate(RoutineKind::Hessian, all.clone(), black_box(places), None, outputs)));
         },
     ));
     assert_same(&lines, &[(e0, e1), (g0, g1), (h0, h1)]);
@@ -210,7 +212,13 @@ fn force<E: PackedForce<f64, Wide<f64> = E>>() -> Vec<Line> {
         || drop(black_box(packed.forces(all.clone(), black_box(x), v, &mut f0))),
         || {
             let outputs = &mut [output(&vectors, &mut f1)];
-            drop(black_box(case.tape.evaluate("force", all.clone(), black_box(places), Some(speeds), outputs)));
+            drop(black_box(case.tape.evaluate(
+                RoutineKind::Force,
+                all.clone(),
+                black_box(places),
+                Some(speeds),
+                outputs,
+            )));
         },
     )];
     assert_same(&lines, &[(&f0, &f1)]);
@@ -219,7 +227,13 @@ fn force<E: PackedForce<f64, Wide<f64> = E>>() -> Vec<Line> {
         || drop(black_box(packed.force_jacobians(all.clone(), black_box(x), v, &mut f0, &mut a0, &mut b0))),
         || {
             let outputs = &mut [output(&vectors, &mut f1), output(&position, &mut a1), output(&velocity, &mut b1)];
-            drop(black_box(case.tape.evaluate("jacobians", all.clone(), black_box(places), Some(speeds), outputs)));
+            drop(black_box(case.tape.evaluate(
+                RoutineKind::Jacobians,
+                all.clone(),
+                black_box(places),
+                Some(speeds),
+                outputs,
+            )));
         },
     ));
     assert_same(&lines, &[(&f0, &f1), (&a0, &a1), (&b0, &b1)]);
@@ -243,7 +257,7 @@ fn residual<E: PackedResidual<f64, Wide<f64> = E>>() -> Vec<Line> {
         || drop(black_box(packed.residuals(all.clone(), black_box(&case.positions), &mut r0))),
         || {
             let outputs = &mut [output(&value, &mut r1)];
-            drop(black_box(case.tape.evaluate("residual", all.clone(), black_box(places), None, outputs)));
+            drop(black_box(case.tape.evaluate(RoutineKind::Residual, all.clone(), black_box(places), None, outputs)));
         },
     )];
     assert_same(&lines, &[(&r0, &r1)]);
@@ -252,7 +266,7 @@ fn residual<E: PackedResidual<f64, Wide<f64> = E>>() -> Vec<Line> {
         || drop(black_box(packed.jacobians(all.clone(), black_box(&case.positions), &mut r0, &mut j0))),
         || {
             let outputs = &mut [output(&value, &mut r1), output(&jacobian, &mut j1)];
-            drop(black_box(case.tape.evaluate("jacobian", all.clone(), black_box(places), None, outputs)));
+            drop(black_box(case.tape.evaluate(RoutineKind::Jacobian, all.clone(), black_box(places), None, outputs)));
         },
     ));
     assert_same(&lines, &[(&r0, &r1), (&j0, &j1)]);

@@ -3,7 +3,7 @@
 //! Inputs are first *reduced*: if points enter only as differences, derivatives are taken with respect to these
 //! (`coordinates.rs`). First derivatives flow forward as sparse dual parts (`forward.rs`) or back from the outputs
 //! (`adjoint.rs`). Second derivatives flow forward, weighted by adjoints, or are gathered at a few primitives
-//! (`cut.rs`). `plan.rs` takes the cheapest route.
+//! (`cut.rs`). `routes.rs` takes the cheapest route.
 
 mod adjoint;
 mod coordinates;
@@ -12,13 +12,13 @@ mod dihedral;
 mod expand;
 mod forward;
 mod local;
-mod plan;
+mod routes;
 
 pub use coordinates::{Coordinates, Moving};
 pub use dihedral::only_dihedral;
 pub use forward::{first_derivatives, second_derivatives};
 pub use local::Order;
-pub use plan::{Plan, SecondOrder, first_order, hessian_vector, second_order};
+pub use routes::{Routes, SecondOrder, first_order, hessian_vector, second_order};
 
 use std::collections::{BTreeMap, BTreeSet};
 

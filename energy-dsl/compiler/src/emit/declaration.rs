@@ -1,42 +1,29 @@
 use proc_macro2::TokenStream;
 use quote::{ToTokens, format_ident, quote};
 
-use crate::check::{Input, Program};
-use crate::graph::NodeId;
-use crate::routines::{Routine, Routines};
-use energy_runtime::{Kind, OperationCount};
+use energy_runtime::{Declaration, Field, OperationCount, Routine};
 
-/// Emits the `Declaration` of the generated type.
-pub(super) fn declaration(program: &Program, routines: &Routines) -> TokenStream {
-    let name = &program.name;
-    let kind = match program.kind {
-        Kind::Energy => quote!(Energy),
-        Kind::Constraint => quote!(Constraint),
-        Kind::Force => quote!(Force),
-        Kind::Residual => quote!(Residual),
-    };
-    let docs = program.docs.iter().map(|line| line.strip_prefix(' ').unwrap_or(line)).collect::<Vec<_>>().join("\n");
-    let (formula, source) = (&program.formula, &program.source);
-    // The stiffness and damping of a constraint are implied by its kind.
-    let implied = if program.kind == Kind::Constraint { 2 } else { 0 };
-    let declared = &program.parameters[..program.parameters.len() - implied];
-    let (points, rest, parameters) = (fields(&program.moving), fields(&program.rest), fields(declared));
-    let rows = program.rows();
-    let (invariant, coordinates) = (routines.translation_invariant, routines.coordinates);
-    let Character { curved, quadratic, velocity_dependent, symmetric } = character(program, routines);
-    let vectors = routines.vectors.iter().map(|vector| {
+/// Emits the self-description of the generated type, which borrows its texts and lists.
+pub(super) fn declaration(declaration: &Declaration) -> TokenStream {
+    let Declaration { name, docs, formula, source, rows, translation_invariant, curved, quadratic, .. } = declaration;
+    let Declaration { velocity_dependent, symmetric, reduced_coordinates, primitives, .. } = declaration;
+    let kind = declaration.kind;
+    let kind = format_ident!("{kind:?}");
+    let vectors = declaration.reduced_vectors.iter().map(|vector| {
         let ends = vector.iter().map(|(point, sign)| quote!((#point, #sign)));
         borrowed(quote!(&[#(#ends),*]))
     });
-    let dihedral = match routines.dihedral {
+    let dihedral = match declaration.dihedral {
         Some(points) => quote!(::core::option::Option::Some([#(#points),*])),
         None => quote!(::core::option::Option::None),
     };
-    let primitives = &routines.primitives;
-    let properties = program.properties.iter().map(|(property, _)| format_ident!("{property:?}"));
-    let list = routines.list.iter().map(|r| routine(routines, r));
-    let [name, docs, formula, source] = [name, &docs, formula, source].map(borrowed);
-    let [points, rest, parameters] = [points, rest, parameters].map(|fields| borrowed(quote!(&[#fields])));
+    let properties = declaration.properties.iter().map(|property| format_ident!("{property:?}"));
+    let list = declaration.routines.iter().map(routine);
+    let [name, docs, formula, source] = [name, docs, formula, source].map(|text| borrowed(&**text));
+    let [points, rest, parameters] = [&declaration.points, &declaration.rest, &declaration.parameters].map(|fields| {
+        let fields = fields.iter().map(field);
+        borrowed(quote!(&[#(#fields)*]))
+    });
     let properties = borrowed(quote!(&[#(::energy_dsl::Property::#properties),*]));
     let [vectors, primitives, list] =
         [quote!(&[#(#vectors),*]), quote!(&[#(#primitives),*]), quote!(&[#(#list),*])].map(borrowed);
@@ -53,12 +40,12 @@ pub(super) fn declaration(program: &Program, routines: &Routines) -> TokenStream
             parameters: #parameters,
             rows: #rows,
             properties: #properties,
-            translation_invariant: #invariant,
+            translation_invariant: #translation_invariant,
             curved: #curved,
             quadratic: #quadratic,
             velocity_dependent: #velocity_dependent,
             symmetric: #symmetric,
-            reduced_coordinates: #coordinates,
+            reduced_coordinates: #reduced_coordinates,
             reduced_vectors: #vectors,
             dihedral: #dihedral,
             primitives: #primitives,
@@ -67,58 +54,20 @@ pub(super) fn declaration(program: &Program, routines: &Routines) -> TokenStream
     }}
 }
 
-/// Properties that solvers rely on.
-pub(crate) struct Character {
-    pub(crate) curved: bool,
-    pub(crate) quadratic: bool,
-    pub(crate) velocity_dependent: bool,
-    pub(crate) symmetric: bool,
-}
-
-pub(crate) fn character(program: &Program, routines: &Routines) -> Character {
-    let group = |routine: &str, number: usize| {
-        let routine = routines.list.iter().find(|r| r.name == routine)?;
-        routine.groups.get(number)
-    };
-    let varies = |nodes: Option<&Vec<NodeId>>| nodes.is_some_and(|n| n.iter().any(|&e| !routines.graph.is(e, 0.0)));
-    let (by_position, by_velocity) = (group("jacobians", 1), group("jacobians", 2));
-    let n = program.points();
-    let mirrored = |square: &Vec<NodeId>| {
-        let entry = |row: usize, column: usize| square[9 * (row / 3 * n + column / 3) + 3 * (row % 3) + column % 3];
-        (0..3 * n).all(|row| (0..row).all(|column| entry(row, column) == entry(column, row)))
-    };
-    let constant = |nodes: &Vec<NodeId>| nodes.iter().all(|&entry| !routines.graph.varies(entry));
-    Character {
-        quadratic: match (by_position, by_velocity) {
-            (None, None) => group("hessian", 2).is_some_and(constant),
-            jacobians => [jacobians.0, jacobians.1].into_iter().flatten().all(constant),
-        },
-        curved: varies(group("hessian", 2).or(by_position)),
-        velocity_dependent: varies(by_velocity),
-        symmetric: [by_position, by_velocity].into_iter().flatten().all(mirrored),
-    }
-}
-
 /// Writes a constant that a description borrows.
 fn borrowed(constant: impl ToTokens) -> TokenStream {
     quote!(Borrowed(#constant))
 }
 
-fn fields(inputs: &[Input]) -> TokenStream {
-    inputs
-        .iter()
-        .map(|input| {
-            let (name, size, unit) = (&input.name, input.input_type.size(), &input.unit);
-            let [name, unit] = [name, unit].map(borrowed);
-            quote!(::energy_dsl::Field { name: #name, size: #size, unit: #unit },)
-        })
-        .collect()
+fn field(field: &Field) -> TokenStream {
+    let [name, unit] = [&field.name, &field.unit].map(|text| borrowed(&**text));
+    let size = field.size;
+    quote!(::energy_dsl::Field { name: #name, size: #size, unit: #unit },)
 }
 
-fn routine(routines: &Routines, routine: &Routine) -> TokenStream {
+fn routine(routine: &Routine) -> TokenStream {
     let name = routine.name;
-    let [reduced, full] =
-        [routine.reduced_outputs(), routine.outputs()].map(|outputs| tokens(routines.count(&outputs)));
+    let [reduced, full] = [routine.reduced, routine.full].map(tokens);
     quote!(::energy_dsl::Routine { name: #name, reduced: #reduced, full: #full })
 }
 

@@ -1,38 +1,35 @@
 use proc_macro2::{Ident, TokenStream};
 use quote::{format_ident, quote};
 
+use super::Emitter;
 use super::declaration::declaration;
 use super::methods::component;
 use super::repeated;
-use super::schedule::Schedule;
+use super::statements::arranged;
 use super::traits::traits;
-use crate::budget::Phase;
 use crate::check::{Input as DeclaredInput, Program};
 use crate::graph::Input;
-use crate::routines::Routines;
-use energy_runtime::Kind;
+use crate::plan::{Plan, Shape};
+use energy_runtime::{Kind, Routine};
 
-/// Bytes of the tokens that any declaration has.
-const DECLARATION_BYTES: u64 = 600_000;
-
-/// Emits the type, its constructor, its traits, and the audit test if requested.
-#[must_use]
-pub fn emit(program: &Program, routines: &Routines) -> TokenStream {
-    program.budget.enter(Phase::Writing);
-    program.budget.spend(1000, DECLARATION_BYTES);
-    let name = format_ident!("{}", program.name, span = program.span.token);
-    let structure = structure(&name, program, routines);
-    let constructor = constructor(&name, program, routines);
-    let element = element(&name, program, routines);
-    let term = repeated::term(&name, program, routines);
-    let traits = traits(&name, program, routines);
-    let packed = packed(&name, program, routines);
-    let test = audit_test(&name, program);
-    quote!(#structure #constructor #element #term #traits #packed #test)
+impl Emitter<'_> {
+    pub(super) fn items(&self) -> TokenStream {
+        let parts = [
+            structure(self),
+            constructor(self),
+            element(self),
+            repeated::term(self),
+            traits(self),
+            packed(self),
+            audit_test(&self.name, self.program),
+        ];
+        parts.into_iter().collect()
+    }
 }
 
-fn structure(name: &Ident, program: &Program, routines: &Routines) -> TokenStream {
-    let docs = documentation(program, routines);
+fn structure(emitter: &Emitter<'_>) -> TokenStream {
+    let Emitter { name, program, plan, .. } = emitter;
+    let docs = documentation(program, plan);
     let visibility: TokenStream = program.visibility.parse().unwrap_or_default();
     let fields = program.parameters.iter().map(|parameter| {
         let (field, field_type) = (format_ident!("{}", parameter.name), input_type(parameter));
@@ -42,12 +39,10 @@ fn structure(name: &Ident, program: &Program, routines: &Routines) -> TokenStrea
         };
         quote!(#[doc = #doc] pub #field: #field_type,)
     });
-    let precomputed = (!routines.rest.outputs.is_empty()).then(|| {
-        let stored = routines.rest.outputs.len();
-        quote!(precomputed: [T; #stored],)
-    });
+    let stored = plan.stored();
+    let precomputed = (stored > 0).then(|| quote!(precomputed: [T; #stored],));
     // A type without fields still needs to name its number type.
-    let marker = holds_nothing(program, routines).then(|| quote!(number: ::core::marker::PhantomData<T>,));
+    let marker = holds_nothing(program, plan).then(|| quote!(number: ::core::marker::PhantomData<T>,));
     quote! {
         #(#[doc = #docs])*
         #[derive(Clone, Copy, Debug, PartialEq)]
@@ -60,19 +55,20 @@ fn structure(name: &Ident, program: &Program, routines: &Routines) -> TokenStrea
     }
 }
 
-fn holds_nothing(program: &Program, routines: &Routines) -> bool {
-    program.parameters.is_empty() && routines.rest.outputs.is_empty()
+fn holds_nothing(program: &Program, plan: &Plan) -> bool {
+    program.parameters.is_empty() && plan.stored() == 0
 }
 
 /// Returns the doc comment and a description of the compiled form.
-fn documentation(program: &Program, routines: &Routines) -> Vec<String> {
+fn documentation(program: &Program, plan: &Plan) -> Vec<String> {
     let mut lines = program.docs.clone();
     let list = |inputs: &[DeclaredInput]| inputs.iter().map(|i| i.name.clone()).collect::<Vec<_>>().join(", ");
     lines.extend(["".into(), "# Formula".into(), "```text".into(), program.formula.clone(), "```".into()]);
     let moving = if program.kind == Kind::Residual { "unknowns" } else { "points" };
     lines.push(format!("A declared {} of the {moving} {}.", program.kind.keyword(), list(&program.moving)));
-    if !routines.primitives.is_empty() {
-        lines.push(format!("Compiled to the robust primitives: {}.", routines.primitives.join("; ")));
+    let primitives = &plan.declaration.primitives;
+    if !primitives.is_empty() {
+        lines.push(format!("Compiled to the robust primitives: {}.", primitives.join("; ")));
     }
     if program.uncompensated {
         lines.push(
@@ -82,10 +78,8 @@ fn documentation(program: &Program, routines: &Routines) -> Vec<String> {
         );
     }
     lines.extend(["".into(), "| routine | operations | in reduced coordinates |".into(), "|---|---|---|".into()]);
-    for routine in &routines.list {
-        let (full, reduced) =
-            (routines.count(&routine.outputs()).total(), routines.count(&routine.reduced_outputs()).total());
-        lines.push(format!("| `{}` | {full} | {reduced} |", routine.name));
+    for Routine { name, full, reduced } in plan.declaration.routines.iter() {
+        lines.push(format!("| `{name}` | {} | {} |", full.total(), reduced.total()));
     }
     lines
 }
@@ -95,7 +89,8 @@ pub(super) fn input_type(input: &DeclaredInput) -> TokenStream {
 }
 
 /// Emits `new`, which takes the rest shape and then the parameters, and its counterpart for flat slices.
-fn constructor(name: &Ident, program: &Program, routines: &Routines) -> TokenStream {
+fn constructor(emitter: &Emitter<'_>) -> TokenStream {
+    let Emitter { name, program, plan, .. } = emitter;
     let argument = |input: &DeclaredInput| {
         let (name, input_type) = (format_ident!("{}", input.name), input_type(input));
         quote!(#name: #input_type)
@@ -118,15 +113,16 @@ fn constructor(name: &Ident, program: &Program, routines: &Routines) -> TokenStr
     let mut values = flat(&program.rest, format_ident!("rest"));
     values.extend(flat(&program.parameters, format_ident!("parameters")));
     let element = &program.name;
-    let (result, body, from_flat) = if routines.rest.outputs.is_empty() {
-        let marker = holds_nothing(program, routines).then(|| quote!(number: ::core::marker::PhantomData));
+    let (result, body, from_flat) = if plan.stored() == 0 {
+        let marker = holds_nothing(program, plan).then(|| quote!(number: ::core::marker::PhantomData));
         (quote!(Self), quote!(Self { #(#fields,)* #marker }), quote!(Ok(Self::new(#(#values),*))))
     } else {
-        let read = |input: Input| read_input(&program.rest, &program.parameters, input);
-        let mut schedule = Schedule::new(&routines.rest.graph, &read);
-        let precomputed = schedule.array(&routines.rest.outputs);
-        let degenerate = schedule.mask(routines.refused);
-        let statements = schedule.statements();
+        let code = &plan.rest.ordinary;
+        let mut read = |input: Input| read_input(&program.rest, &program.parameters, input);
+        let rendered = emitter.rendered(code, &mut read);
+        let precomputed = arranged(Shape::Numbers, &rendered.numbers(&code.groups[0]));
+        let degenerate = rendered.mask(code.flags[0]);
+        let statements = rendered.statements;
         let inputs = || program.rest.iter().chain(&program.parameters);
         let names: Vec<_> = inputs().map(|input| format_ident!("{}", input.name)).collect();
         let types = inputs().map(input_type);
@@ -158,7 +154,7 @@ fn constructor(name: &Ident, program: &Program, routines: &Routines) -> TokenStr
         let result = quote!(::core::result::Result<Self, ::energy_dsl::RestError>);
         (result, body, quote!(Self::new(#(#values),*)))
     };
-    let errors = (!routines.rest.outputs.is_empty()).then(|| {
+    let errors = (plan.stored() > 0).then(|| {
         quote! {
             #[doc = ""]
             #[doc = "# Errors"]
@@ -195,8 +191,9 @@ fn read_input(rest: &[DeclaredInput], parameters: &[DeclaredInput], input: Input
     component(list, number, &quote!())
 }
 
-fn element(name: &Ident, program: &Program, routines: &Routines) -> TokenStream {
-    let declaration = declaration(program, routines);
+fn element(emitter: &Emitter<'_>) -> TokenStream {
+    let Emitter { name, program, plan, .. } = emitter;
+    let declaration = declaration(&plan.declaration);
     let evaluate = format_ident!(
         "evaluate_{}",
         match program.kind {
@@ -222,7 +219,8 @@ fn element(name: &Ident, program: &Program, routines: &Routines) -> TokenStream 
 }
 
 /// Emits the packed form: elements as plain numbers, and one element per lane.
-fn packed(name: &Ident, program: &Program, routines: &Routines) -> TokenStream {
+fn packed(emitter: &Emitter<'_>) -> TokenStream {
+    let Emitter { name, program, plan, .. } = emitter;
     // Fields and their indices, number by number.
     let mut stores = Vec::new();
     let mut loads = Vec::new();
@@ -251,10 +249,10 @@ fn packed(name: &Ident, program: &Program, routines: &Routines) -> TokenStream {
     for parameter in &program.parameters {
         field(&format_ident!("{}", parameter.name), &parameter.input_type.dimensions());
     }
-    if !routines.rest.outputs.is_empty() {
-        field(&format_ident!("precomputed"), &[routines.rest.outputs.len()]);
+    if plan.stored() > 0 {
+        field(&format_ident!("precomputed"), &[plan.stored()]);
     }
-    let marker = holds_nothing(program, routines).then(|| quote!(number: ::core::marker::PhantomData,));
+    let marker = holds_nothing(program, plan).then(|| quote!(number: ::core::marker::PhantomData,));
     let traits = match program.kind {
         Kind::Energy => vec!["PackedPotential"],
         Kind::Constraint => vec!["PackedPotential", "PackedForce"],

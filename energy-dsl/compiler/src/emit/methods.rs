@@ -6,54 +6,125 @@
 //!
 //! For a sum of like terms, these are the routines of one term, and `f_at` is the loop over all.
 
-use std::cell::RefCell;
-
 use proc_macro2::{Ident, TokenStream};
 use quote::{format_ident, quote};
 
+use super::Emitter;
 use super::repeated::{self, term_of};
-use super::schedule::Schedule;
-use crate::budget::Budget;
+use super::statements::arranged;
 use crate::check::{Input as DeclaredInput, Program};
-use crate::graph::{Graph, Input, NodeId};
-use crate::routines::{General, Routine, Routines};
-use energy_runtime::Kind;
-
-/// Converts a group of outputs to an expression.
-pub(super) type Layout = fn(&mut Schedule<'_>, &[NodeId]) -> TokenStream;
-
-pub(super) const NUMBER: Layout = |schedule, nodes| schedule.value(nodes[0]);
-pub(super) const NUMBERS: Layout = |schedule, nodes| schedule.array(nodes);
-pub(super) const VECTORS: Layout = |schedule, nodes| schedule.vectors(nodes);
-pub(super) const BLOCKS: Layout = |schedule, nodes| schedule.blocks(nodes);
+use crate::graph::Input;
+use crate::plan::{Code, GeneralPlan, RoutinePlan, Shape, groups};
+use energy_runtime::{Kind, RoutineKind};
 
 /// A routine as a method of its trait.
-pub(super) struct Method {
-    pub(super) routine: &'static str,
+struct Method {
+    name: Ident,
     /// Kernel that calls the routine.
-    pub(super) call: &'static str,
-    /// Returned struct, its fields, its type arguments, and the types of its fields.
-    pub(super) result: &'static str,
-    pub(super) fields: &'static [(&'static str, Layout)],
-    pub(super) generics: Vec<TokenStream>,
-    pub(super) field_types: Vec<TokenStream>,
-    /// Arguments after `self`.
-    pub(super) arguments: Vec<(&'static str, TokenStream)>,
+    call: Ident,
+    /// Returned struct.
+    result: Ident,
+    /// The fields of the returned struct, but for its flags.
+    fields: Vec<Field>,
+    /// Arguments after `self`: names and types.
+    arguments: Vec<(Ident, TokenStream)>,
+}
+
+/// A field of a returned struct.
+struct Field {
+    name: Ident,
+    shape: Shape,
+    field_type: TokenStream,
+}
+
+impl Method {
+    fn new(routine: &RoutinePlan, program: &Program) -> Self {
+        let (call, result) = names(routine.kind);
+        let field = |(&(name, shape), size): (&(&str, Shape), usize)| {
+            let length = match shape {
+                Shape::Number | Shape::Numbers => size,
+                Shape::Vectors => size / 3,
+                Shape::Blocks => size / 9,
+            };
+            Field { name: format_ident!("{name}"), shape, field_type: array(shape, length) }
+        };
+        let points = || array(Shape::Vectors, program.points());
+        let arguments = match routine.kind {
+            RoutineKind::Residual | RoutineKind::Jacobian => vec![("u", array(Shape::Numbers, program.moving_size()))],
+            RoutineKind::HessianVector | RoutineKind::Force | RoutineKind::Jacobians => {
+                vec![("x", points()), ("v", points())]
+            }
+            _ => vec![("x", points())],
+        };
+        Self {
+            name: format_ident!("{}", routine.kind.name()),
+            call: format_ident!("{call}"),
+            result: format_ident!("{result}"),
+            fields: groups(routine.kind).iter().zip(routine.sizes()).map(field).collect(),
+            arguments: arguments.into_iter().map(|(name, of)| (format_ident!("{name}"), of)).collect(),
+        }
+    }
+
+    /// Returns the type of the returned struct. Its arguments are the number type and those of its arrays; both Jacobians
+    /// of a force share theirs.
+    fn result_type(&self) -> TokenStream {
+        let has_argument = |field: &&Field| field.shape != Shape::Number && field.name != "by_velocity";
+        let arrays = self.fields.iter().filter(has_argument).map(|field| &field.field_type);
+        let (result, number) = (&self.result, quote!(T));
+        let arguments = std::iter::once(&number).chain(arrays);
+        quote!(::energy_dsl::#result<#(#arguments),*>)
+    }
+
+    /// Returns the names of the fields and of the flags, in reverse order.
+    fn reversed_fields(&self) -> Vec<Ident> {
+        let flags = format_ident!("flags");
+        std::iter::once(flags).chain(self.fields.iter().rev().map(|field| field.name.clone())).collect()
+    }
+}
+
+/// Returns the kernel that calls a routine, and the struct that it returns.
+fn names(kind: RoutineKind) -> (&'static str, &'static str) {
+    match kind {
+        RoutineKind::Value => ("ValueCall", "Value"),
+        RoutineKind::Gradient => ("GradientCall", "Gradient"),
+        RoutineKind::Hessian => ("HessianCall", "Hessian"),
+        RoutineKind::ReducedHessian => ("ReducedHessianCall", "ReducedHessian"),
+        RoutineKind::HessianVector => ("HessianVectorCall", "HessianVector"),
+        RoutineKind::Force => ("ForceCall", "ForceValue"),
+        RoutineKind::Jacobians => ("JacobiansCall", "ForceJacobians"),
+        RoutineKind::ConstraintJacobian => ("ConstraintJacobianCall", "ConstraintJacobian"),
+        RoutineKind::ConstraintHessian => ("ConstraintHessianCall", "ConstraintHessian"),
+        RoutineKind::GaussNewton => ("GaussNewtonCall", "Hessian"),
+        RoutineKind::Residual => ("ResidualCall", "ResidualValue"),
+        RoutineKind::Jacobian => ("ResidualJacobianCall", "ResidualJacobian"),
+        RoutineKind::Rest => unreachable!("compiler bug: the rest block is run by `new`"),
+    }
+}
+
+/// Returns the type of `length` numbers, vectors or blocks.
+pub(super) fn array(shape: Shape, length: usize) -> TokenStream {
+    match shape {
+        Shape::Number => quote!(T),
+        Shape::Numbers => quote!([T; #length]),
+        Shape::Vectors => quote!([::energy_dsl::Vector3<T>; #length]),
+        Shape::Blocks => quote!([::energy_dsl::Block<T>; #length]),
+    }
 }
 
 /// Emits the implementation of a trait, and the general paths of its routines.
 pub(super) fn implementation(
-    name: &Ident,
+    emitter: &Emitter<'_>,
     of: &str,
     types: &TokenStream,
-    methods: &[Method],
-    program: &Program,
-    routines: &Routines,
+    list: &[RoutineKind],
 ) -> TokenStream {
-    let of = format_ident!("{of}");
-    let term = term_of(name, routines);
+    let (name, of) = (&emitter.name, format_ident!("{of}"));
+    let term = term_of(emitter);
     let owner = term.as_ref().unwrap_or(name);
-    let emitted = methods.iter().map(|method| self::method(method, owner, program, routines));
+    let emitted = list.iter().map(|&kind| {
+        let routine = emitter.plan.find(kind).expect("compiler bug: a routine of another kind of declaration");
+        method(emitter, routine, owner)
+    });
     let (levelled, general): (Vec<_>, Vec<_>) = emitted
         .map(|Emitted { plain, levelled, general }| match &term {
             None => (quote!(#plain #levelled), general),
@@ -89,41 +160,30 @@ struct Emitted {
     general: TokenStream,
 }
 
-/// Emits a method. Its routine is one of `owner`: the element, or one term of it.
-fn method(method: &Method, owner: &Ident, program: &Program, routines: &Routines) -> Emitted {
-    let routine = routines
-        .list
-        .iter()
-        .find(|r| r.name == method.routine)
-        .expect("compiler bug: a routine of another kind of declaration");
-    let (plain, call, result) =
-        (format_ident!("{}", method.routine), format_ident!("{}", method.call), format_ident!("{}", method.result));
-    let levelled = format_ident!("{plain}_at");
-    let generics = &method.generics;
-    let result_type = quote!(::energy_dsl::#result<#(#generics),*>);
-    let names: Vec<_> = method.arguments.iter().map(|(name, _)| format_ident!("{name}")).collect();
-    let types = method.arguments.iter().map(|(_, argument_type)| argument_type);
+/// Emits a method. Its routine is one of `owner`: the element, or one term of it, if it is a sum.
+fn method(emitter: &Emitter<'_>, routine: &RoutinePlan, owner: &Ident) -> Emitted {
+    let method = Method::new(routine, emitter.program);
+    let Method { name, call, result, fields, arguments } = &method;
+    let levelled = format_ident!("{name}_at");
+    let result_type = method.result_type();
+    let (names, types): (Vec<_>, Vec<_>) = arguments.iter().map(|(name, of)| (name, of)).unzip();
     let arguments = quote!(&self, #(#names: &#types),*);
-    let ordinary = body(method, program, routines, &routine.groups, routine.flags);
+    let ordinary = body(emitter, &method, &routine.ordinary);
     let (body, general) = match &routine.general {
         None => (ordinary, TokenStream::new()),
         Some(general) => {
             let [has_guards, is_ordinary, if_ordinary, in_general] =
-                ["has_guards", "is_ordinary", "if_ordinary", "in_general"].map(|form| format_ident!("{plain}_{form}"));
+                ["has_guards", "is_ordinary", "if_ordinary", "in_general"].map(|form| format_ident!("{name}_{form}"));
             // Field by field in reverse order: passed on as a whole, the struct would live in memory on both paths.
-            let fields: Vec<_> = ["flags"]
-                .into_iter()
-                .chain(method.fields.iter().rev().map(|(field, _)| *field))
-                .map(|field| format_ident!("{field}"))
-                .collect();
-            let field_types = method.field_types.iter().rev();
+            let field_types = fields.iter().rev().map(|field| &field.field_type);
             let parts = quote!((::energy_dsl::Flags<T>, #(#field_types),*));
+            let fields = method.reversed_fields();
             // Lanes are computed first, while they are in registers of the level; lanes that need the general path are
             // replaced afterwards. A scalar branches on the guards first. It looks at its results after they are
             // computed: before the branch, they would occupy registers. Values are passed by copy: a reference would
             // force them into memory on both paths.
-            let WithCare { inputs, outputs, reads, returns, summed, code } =
-                with_care(method, owner, program, routines, routine, general);
+            let WithCare { inputs, outputs, returns, code } = with_care(emitter, &method, owner, routine, general);
+            let (reads, summed) = (inputs.len(), general.summed);
             let select = quote! {
                 if T::WIDE {
                     let ordinary = self.#is_ordinary::<L>(#(#names),*);
@@ -145,7 +205,7 @@ fn method(method: &Method, owner: &Ident, program: &Program, routines: &Routines
                 let (#(#fields),*) = Self::#in_general(&[#(#inputs),*], ordinary, here);
                 ::energy_dsl::#result { #(#fields),* }
             };
-            let [guards, guard] = [general.guards, general.ordinary].map(|node| mask(program, routines, node));
+            let [guards, guard] = [&general.before, &general.guard].map(|code| mask(emitter, code));
             let general = quote! {
                 /// Whether the guards of the ordinary path hold. Its results may still be infinite.
                 #[inline(always)]
@@ -186,7 +246,7 @@ fn method(method: &Method, owner: &Ident, program: &Program, routines: &Routines
             (select, general)
         }
     };
-    let sum = routines.repetition.as_ref().map(|_| {
+    let sum = emitter.plan.repetition.as_ref().map(|_| {
         let sum = repeated::sum(owner, &levelled, &names);
         quote! {
             #[inline(always)]
@@ -197,7 +257,7 @@ fn method(method: &Method, owner: &Ident, program: &Program, routines: &Routines
     });
     let plain = quote! {
         #[inline]
-        fn #plain(#arguments) -> #result_type {
+        fn #name(#arguments) -> #result_type {
             T::dispatch(::energy_dsl::#call(self, #(#names),*))
         }
 
@@ -218,71 +278,42 @@ struct WithCare {
     inputs: Vec<TokenStream>,
     /// Fields of the result, taken from `numbers`.
     outputs: TokenStream,
-    /// Number of inputs.
-    reads: usize,
     /// Number of outputs.
     returns: usize,
-    /// Index from which outputs are added to each other.
-    summed: usize,
     code: TokenStream,
 }
 
 fn with_care(
+    emitter: &Emitter<'_>,
     method: &Method,
-    name: &Ident,
-    program: &Program,
-    routines: &Routines,
-    routine: &Routine,
-    general: &General,
+    owner: &Ident,
+    routine: &RoutinePlan,
+    general: &GeneralPlan,
 ) -> WithCare {
-    let inputs = RefCell::new(Vec::new());
-    let read = |input: Input| {
-        let mut inputs = inputs.borrow_mut();
-        let number = inputs.iter().position(|&other| other == input).unwrap_or_else(|| {
-            inputs.push(input);
-            inputs.len() - 1
-        });
+    let (inputs, moves) = general.inputs();
+    let mut read = |input: Input| {
+        let number = inputs.iter().position(|&other| other == input).expect("compiler bug: an input of the path");
         quote!(inputs[#number])
     };
-    let mut schedule = Schedule::new(&routines.graph, &read);
-    let all: Vec<NodeId> = general.groups.concat();
-    let results = schedule.array(&all);
-    let [degenerate, kink, outside, definite] =
-        [general.flags[0], general.flags[1], general.outside, general.definite].map(|mask| schedule.mask(mask));
-    let statements = schedule.statements();
-    let is_outside = match general.outside {
+    let path = emitter.rendered(&general.path, &mut read);
+    let results = arranged(Shape::Numbers, &path.numbers(&general.path.groups.concat()));
+    let [degenerate, kink] = general.path.flags.map(|mask| path.mask(mask));
+    let [outside, definite] = general.path.settled.map(|mask| path.mask(mask));
+    let statements = path.statements;
+    let is_outside = match &general.outside {
         None => quote!(::energy_dsl::Mask::none()),
-        Some(outside) => {
-            let mut schedule = Schedule::new(&routines.graph, &read);
-            let outside = schedule.value(outside);
-            let statements = schedule.statements();
-            quote!(#statements #outside)
-        }
+        Some(outside) => returned_mask(emitter, outside, &mut read),
     };
-    let mut first = 0;
-    let outputs = method.fields.iter().zip(&general.groups).map(|((field, layout), nodes)| {
-        let field = format_ident!("{field}");
-        // The layout of consecutive numbers.
-        let mut graph = Graph::textbook().paid_by(routines.graph.budget());
-        let places = first..first + nodes.len();
-        first = places.end;
-        let places: Vec<NodeId> = places.map(|i| graph.input(Input::Precomputed(Budget::input_number(i)))).collect();
-        let read = |input: Input| {
-            let Input::Precomputed(number) = input else { unreachable!("compiler bug: numbers only") };
-            let number = usize::from(number);
-            quote!(numbers[#number])
-        };
-        let value = layout(&mut Schedule::new(&graph, &read), &places);
-        quote!(#field: #value,)
+    let mut numbers = (0_usize..).map(|number| quote!(numbers[#number]));
+    let outputs = method.fields.iter().zip(&general.path.groups).map(|(Field { name, shape, .. }, group)| {
+        let value = arranged(*shape, &numbers.by_ref().take(group.len()).collect::<Vec<_>>());
+        quote!(#name: #value,)
     });
     let outputs = outputs.collect();
-    let inputs = inputs.into_inner();
-    let moves = inputs.iter().map(|input| matches!(input, Input::Position(_) | Input::Velocity(_)));
-    let moves: Vec<bool> = moves.collect();
-    let (sizes, values_first, is_energy) = (routine.sizes(), routine.has_values(), routine.is_energy());
-    let inputs: Vec<TokenStream> = inputs.into_iter().map(|input| read_input(program, input)).collect();
-    let (reads, returns) = (inputs.len(), all.len());
-    let what = format!("`{}` of [`{name}`].", method.routine);
+    let (sizes, values_first, is_energy) = (routine.sizes(), routine.kind.has_values(), routine.kind.is_energy());
+    let inputs: Vec<TokenStream> = inputs.iter().map(|&input| read_input(emitter.program, input)).collect();
+    let (reads, returns) = (inputs.len(), sizes.iter().sum());
+    let what = format!("`{}` of [`{owner}`].", method.name);
     let code = quote! {
         #[doc = #what]
         struct WithCare;
@@ -315,39 +346,30 @@ fn with_care(
             }
         }
     };
-    // Derivatives by several difference vectors are summed when they are expanded to points.
-    let is_summed = method.routine == "reduced_hessian" && routines.vectors.len() > 1;
-    let summed = if is_summed { general.groups[0].len() } else { returns };
-    WithCare { inputs, outputs, reads, returns, summed, code }
+    WithCare { inputs, outputs, returns, code }
 }
 
-/// Emits statements and a mask.
-fn mask(program: &Program, routines: &Routines, node: NodeId) -> TokenStream {
-    let read = |input: Input| read_input(program, input);
-    let mut schedule = Schedule::new(&routines.graph, &read);
-    let mask = schedule.value(node);
-    let statements = schedule.statements();
+/// Emits statements and the mask of a guard.
+fn mask(emitter: &Emitter<'_>, code: &Code) -> TokenStream {
+    returned_mask(emitter, code, &mut |input| read_input(emitter.program, input))
+}
+
+fn returned_mask(emitter: &Emitter<'_>, code: &Code, read: &mut dyn FnMut(Input) -> TokenStream) -> TokenStream {
+    let rendered = emitter.rendered(code, read);
+    let (mask, statements) = (rendered.mask(code.guard), rendered.statements);
     quote!(#statements #mask)
 }
 
 /// Emits statements and the returned struct.
-fn body(
-    method: &Method,
-    program: &Program,
-    routines: &Routines,
-    groups: &[Vec<NodeId>],
-    flags: [Option<NodeId>; 2],
-) -> TokenStream {
-    let read = |input: Input| read_input(program, input);
-    let mut schedule = Schedule::new(&routines.graph, &read);
-    let mut values = Vec::new();
-    for ((field, layout), nodes) in method.fields.iter().zip(groups) {
-        let (field, value) = (format_ident!("{field}"), layout(&mut schedule, nodes));
-        values.push(quote!(#field: #value));
-    }
-    let (degenerate, kink) = (schedule.mask(flags[0]), schedule.mask(flags[1]));
-    let statements = schedule.statements();
-    let result = format_ident!("{}", method.result);
+fn body(emitter: &Emitter<'_>, method: &Method, code: &Code) -> TokenStream {
+    let rendered = emitter.rendered(code, &mut |input| read_input(emitter.program, input));
+    let values = method.fields.iter().zip(&code.groups).map(|(Field { name, shape, .. }, group)| {
+        let value = arranged(*shape, &rendered.numbers(group));
+        quote!(#name: #value)
+    });
+    let values: Vec<TokenStream> = values.collect();
+    let [degenerate, kink] = code.flags.map(|mask| rendered.mask(mask));
+    let (result, statements) = (&method.result, rendered.statements);
     quote! {
         #statements
         ::energy_dsl::#result { #(#values,)* flags: ::energy_dsl::Flags { degenerate: #degenerate, kink: #kink } }

@@ -3,19 +3,20 @@
 use proc_macro2::{Ident, Literal, TokenStream};
 use quote::{format_ident, quote};
 
+use super::Emitter;
 use super::items::input_type;
-use crate::check::Program;
 use crate::lower::Repetition;
-use crate::routines::Routines;
 
 /// Returns the name of the type for one term; `None` if the formula is not a sum of like terms.
-pub(super) fn term_of(name: &Ident, routines: &Routines) -> Option<Ident> {
-    routines.repetition.as_ref().map(|_| format_ident!("TermOf{name}"))
+pub(super) fn term_of(emitter: &Emitter<'_>) -> Option<Ident> {
+    let Emitter { name, plan, .. } = emitter;
+    plan.repetition.as_ref().map(|_| format_ident!("TermOf{name}"))
 }
 
 /// Emits the type for one term; nothing if the formula is not a sum of like terms.
-pub(super) fn term(name: &Ident, program: &Program, routines: &Routines) -> TokenStream {
-    let (Some(term), Some(repetition)) = (term_of(name, routines), &routines.repetition) else {
+pub(super) fn term(emitter: &Emitter<'_>) -> TokenStream {
+    let Emitter { name, program, plan, .. } = emitter;
+    let (Some(term), Some(repetition)) = (term_of(emitter), &plan.repetition) else {
         return TokenStream::new();
     };
     let Repetition { shared, stride, table } = repetition;
@@ -57,7 +58,7 @@ pub(super) fn term(name: &Ident, program: &Program, routines: &Routines) -> Toke
 }
 
 /// Emits the loop that sums a routine over all terms.
-pub(super) fn sum(term: &Ident, routine: &Ident, arguments: &[Ident]) -> TokenStream {
+pub(super) fn sum(term: &Ident, routine: &Ident, arguments: &[&Ident]) -> TokenStream {
     quote! {
         let mut sum = ::energy_dsl::Accumulate::zero();
         for term in 0..#term::<T>::TABLE.len() {

@@ -3,7 +3,7 @@
 //! equal vectors when a and b align.
 
 use super::length::{Direction, assume_moderate, common_scale, direction};
-use super::{Function, Lowered, Shape};
+use super::{Function, Lowered, Shape, Units};
 use crate::graph::{Form, Graph, NodeId, Op, Primitive, Product, Rule, upper};
 use energy_runtime::Flag;
 
@@ -13,6 +13,7 @@ pub(super) const FUNCTIONS: &[Function] = &[Function {
     docs: "Unsigned angle between two 3-vectors, atan2(‖a×b‖, a·b). If they are parallel or one is 0, it \
          contributes no derivatives, and they are flagged.",
     shape: two_vectors,
+    units: Units::Number,
     lower: angle,
     accuracy: "3 / 4 / 7",
 }];

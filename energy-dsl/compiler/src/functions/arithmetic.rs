@@ -2,7 +2,7 @@
 
 use super::inner_product::inner_product;
 use super::polar::recognise_stretch;
-use super::{Function, Lowered, Shape};
+use super::{Function, Lowered, Shape, Units};
 use crate::graph::{Ending, Form, Graph, NodeId, Op, Origin};
 
 pub(super) const FUNCTIONS: &[Function] = &[
@@ -11,6 +11,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
         usage: "a + b",
         docs: "Sum of two values of the same shape.",
         shape: same,
+        units: Units::Same,
         lower: add,
         accuracy: "",
     },
@@ -19,26 +20,37 @@ pub(super) const FUNCTIONS: &[Function] = &[
         usage: "a - b",
         docs: "Difference of two values of the same shape. `x^2 - y^2` of scalars is computed as (x − y)(x + y).",
         shape: same,
+        units: Units::Same,
         lower: sub,
         accuracy: "",
     },
-    Function { name: "neg", usage: "-a", docs: "Negation.", shape: one, lower: neg, accuracy: "" },
+    Function { name: "neg", usage: "-a", docs: "Negation.", shape: one, units: Units::First, lower: neg, accuracy: "" },
     Function {
         name: "*",
         usage: "a * b",
         docs: "Product of scalars, matrices, quaternions or dual quaternions, of a matrix and a vector, or of a \
              scalar and any value.",
         shape: product,
+        units: Units::Product,
         lower: mul,
         accuracy: "",
     },
-    Function { name: "/", usage: "a / b", docs: "Division by a scalar.", shape: quotient, lower: div, accuracy: "" },
+    Function {
+        name: "/",
+        usage: "a / b",
+        docs: "Division by a scalar.",
+        shape: quotient,
+        units: Units::Quotient,
+        lower: div,
+        accuracy: "",
+    },
     Function {
         name: "^",
         usage: "a ^ b",
         docs: "Power of a scalar. Integer and half-integer exponents become products and roots. `norm(d)^α` is a \
              robust primitive. `M^(-1)` is the inverse of a matrix.",
         shape: power,
+        units: Units::Raised,
         lower: pow,
         accuracy: "norm(d)^α: 3 / 3 / 6",
     },

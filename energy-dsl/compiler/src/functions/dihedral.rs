@@ -8,7 +8,7 @@
 
 use super::angle::{accurate_cross, exact_cross};
 use super::length::{common_scale, direction_scaled};
-use super::{Function, Lowered, Shape};
+use super::{Function, Lowered, Shape, Units};
 use crate::graph::{DihedralParts, Form, Graph, NodeId, Primitive, Product, Rule, upper};
 use energy_runtime::Flag;
 
@@ -20,6 +20,7 @@ pub(super) const FUNCTIONS: &[Function] = &[Function {
          area, the angle and its derivatives are 0 and flagged. Sine and cosine of θ and of θ/2 are computed without \
          the angle.",
     shape: four_points,
+    units: Units::Compared,
     lower: dihedral,
     accuracy: "4 / 5 / 7",
 }];

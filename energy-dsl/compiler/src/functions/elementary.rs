@@ -1,11 +1,11 @@
 //! Functions of one or two numbers.
 
-use super::{Function, Lowered, Shape};
+use super::{Function, Lowered, Shape, Units};
 use crate::graph::{Form, Graph, NodeId, Op, Primitive, Rule};
 
 macro_rules! scalar_function {
     (
-        $name:literal, $usage:literal, $docs:literal, $shape:ident, $accuracy:literal,
+        $name:literal, $usage:literal, $docs:literal, $shape:ident, $units:expr, $accuracy:literal,
         |$g:ident, $args:ident| $body:expr
     ) => {
         Function {
@@ -13,6 +13,7 @@ macro_rules! scalar_function {
             usage: $usage,
             docs: $docs,
             shape: $shape,
+            units: $units,
             lower: |$g, $args| Lowered::scalar($body),
             accuracy: $accuracy,
         }
@@ -26,6 +27,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
         "√x, x ≥ 0. The root of `1 - dot(unit(a), unit(b))` or of a multiple is a robust primitive: its derivative \
          at 0 is that of one side, and flagged as a kink.",
         one_scalar,
+        Units::Power(0.5),
         "1",
         |g, a| g.sqrt(a[0].node())
     ),
@@ -35,6 +37,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
         docs: "eˣ of a scalar. For a twist ξ = (θ, t), the dual quaternion (q, ½ t q) with q = (cos ‖θ‖, θ sin \
              ‖θ‖/‖θ‖): it rotates by 2‖θ‖ about θ and translates by t. Regular at θ = 0.",
         shape: |shapes| if shapes == [Shape::Twist] { Ok(Shape::DualQuat) } else { one_scalar(shapes) },
+        units: Units::Exponential,
         lower: |g, a| match a[0].shape {
             Shape::Twist => super::quaternion::exp(g, &a[0]),
             _ => Lowered::scalar(g.exp(a[0].node())),
@@ -46,6 +49,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
         "sin(x)",
         "Sine of an angle in radians. For a dihedral angle or half of one, it is computed without the angle.",
         one_scalar,
+        Units::Plain,
         "1",
         |g, a| g.sin(a[0].node())
     ),
@@ -54,22 +58,40 @@ pub(super) const FUNCTIONS: &[Function] = &[
         "cos(x)",
         "Cosine of an angle in radians. For a dihedral angle or half of one, it is computed without the angle.",
         one_scalar,
+        Units::Plain,
         "1",
         |g, a| g.cos(a[0].node())
     ),
-    scalar_function!("sin_half", "sin_half(x)", "sin(x/2).", one_scalar, "4 / 5 / 9 for a dihedral angle", |g, a| {
-        let half = half(g, a[0].node());
-        g.sin(half)
-    }),
-    scalar_function!("cos_half", "cos_half(x)", "cos(x/2).", one_scalar, "4 / 5 / 9 for a dihedral angle", |g, a| {
-        let half = half(g, a[0].node());
-        g.cos(half)
-    }),
+    scalar_function!(
+        "sin_half",
+        "sin_half(x)",
+        "sin(x/2).",
+        one_scalar,
+        Units::Plain,
+        "4 / 5 / 9 for a dihedral angle",
+        |g, a| {
+            let half = half(g, a[0].node());
+            g.sin(half)
+        }
+    ),
+    scalar_function!(
+        "cos_half",
+        "cos_half(x)",
+        "cos(x/2).",
+        one_scalar,
+        Units::Plain,
+        "4 / 5 / 9 for a dihedral angle",
+        |g, a| {
+            let half = half(g, a[0].node());
+            g.cos(half)
+        }
+    ),
     scalar_function!(
         "atan2",
         "atan2(y, x)",
         "The angle of the point (x, y), in (−π, π]. At the origin it is 0 and flagged.",
         two_scalars,
+        Units::Compared,
         "1",
         |g, a| g.atan2(a[0].node(), a[1].node())
     ),
@@ -78,6 +100,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
         "abs(x)",
         "Absolute value |x|. At 0, a kink, the derivative is 1.",
         one_scalar,
+        Units::First,
         "0",
         |g, a| g.abs(a[0].node())
     ),
@@ -86,6 +109,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
         "min(a, b, …)",
         "Smallest argument. If two are equal, a kink, the derivative is that of the first.",
         some_scalars,
+        Units::Same,
         "0",
         |g, a| fold(g, a, Graph::min)
     ),
@@ -94,6 +118,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
         "max(a, b, …)",
         "Largest argument. If two are equal, a kink, the derivative is that of the first.",
         some_scalars,
+        Units::Same,
         "0",
         |g, a| fold(g, a, Graph::max)
     ),
@@ -102,15 +127,22 @@ pub(super) const FUNCTIONS: &[Function] = &[
         "clamp(x, least, most)",
         "x limited to the range [least, most]: min(max(x, least), most).",
         three_scalars,
+        Units::Same,
         "0",
         |g, a| {
             let raised = g.max(a[0].node(), a[1].node());
             g.min(raised, a[2].node())
         }
     ),
-    scalar_function!("sign", "sign(x)", "−1, 0 or 1; 0 is flagged. The derivative is 0.", one_scalar, "0", |g, a| {
-        sign(g, a[0].node())
-    }),
+    scalar_function!(
+        "sign",
+        "sign(x)",
+        "−1, 0 or 1; 0 is flagged. The derivative is 0.",
+        one_scalar,
+        Units::Number,
+        "0",
+        |g, a| sign(g, a[0].node())
+    ),
     scalar_function!(
         "power_of_two",
         "power_of_two(x)",
@@ -118,6 +150,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
          Multiplication by s is exact: use it to scale a rest shape near 1 in formulas whose result does not depend \
          on s.",
         one_scalar,
+        Units::Power(-1.0),
         "0",
         |g, a| g.power_of_two_scale(a[0].node())
     ),
@@ -126,6 +159,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
         "one_minus_cos(x)",
         "1 − cos x = 2 sin²(x/2), accurate near 0. `1 - cos(x)` is compiled to it.",
         one_scalar,
+        Units::Plain,
         "3 / 2 / 2",
         |g, a| versine(g, a[0].node())
     ),
@@ -134,6 +168,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
         "x_minus_sin(x)",
         "x − sin x, accurate near 0: by its series for |x| < 1.",
         one_scalar,
+        Units::Plain,
         "5 / 2 / 1",
         |g, a| sine_remainder(g, a[0].node())
     ),

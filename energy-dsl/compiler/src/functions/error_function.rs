@@ -4,7 +4,7 @@ use std::f64::consts::FRAC_2_SQRT_PI;
 
 use super::elementary::one_scalar;
 use super::power_series::{Interval, economised, polynomial};
-use super::{Function, Lowered};
+use super::{Function, Lowered, Units};
 use crate::graph::{Form, Graph, NodeId, Primitive, Rule};
 
 pub(super) const FUNCTIONS: &[Function] = &[Function {
@@ -12,6 +12,7 @@ pub(super) const FUNCTIONS: &[Function] = &[Function {
     usage: "erf(x)",
     docs: "Error function 2/√π ∫₀ˣ exp(−t²) dt, accurate near 0. The derivative is 2/√π exp(−x²).",
     shape: one_scalar,
+    units: Units::Plain,
     lower: |g, a| Lowered::scalar(erf(g, a[0].node())),
     accuracy: "2 / 3 / 4",
 }];

@@ -2,7 +2,7 @@
 
 use super::elementary::{one_scalar, two_scalars};
 use super::power_series::polynomial;
-use super::{Function, Lowered, Shape};
+use super::{Function, Lowered, Shape, Units};
 use crate::graph::{Form, Graph, NodeId, Op, Primitive, Rule};
 
 pub(super) const FUNCTIONS: &[Function] = &[
@@ -11,6 +11,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
         usage: "log(x)",
         docs: "Natural logarithm, x > 0. `log(1 + x)` is compiled as `log1p(x)`.",
         shape: one_scalar,
+        units: Units::Plain,
         lower: |g, a| Lowered::scalar(log(g, a[0].node())),
         accuracy: "1",
     },
@@ -20,6 +21,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
         docs: "ln(1 + x), x > −1, accurate near 0. Near −1, pass an accurate u = 1 + x as the second argument to \
              avoid cancellation.",
         shape: with_successor,
+        units: Units::Plain,
         lower: |g, a| Lowered::scalar(of_successor(g, a, log1p, log1p_of)),
         accuracy: "4 / 2 / 4",
     },
@@ -29,6 +31,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
         docs: "ln(1 + x) − x, x > −1, accurate near 0, where it is −x²/2. The second argument u = 1 + x is that of \
              `log1p`.",
         shape: with_successor,
+        units: Units::Plain,
         lower: |g, a| Lowered::scalar(of_successor(g, a, log1pmx, log1pmx_of)),
         accuracy: "8 / 3 / 4",
     },
@@ -37,6 +40,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
         usage: "expm1(x)",
         docs: "eˣ − 1, accurate near 0. `exp(x) - 1` is compiled to it.",
         shape: one_scalar,
+        units: Units::Plain,
         lower: |g, a| Lowered::scalar(expm1(g, a[0].node())),
         accuracy: "4 / 1 / 1",
     },
@@ -45,6 +49,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
         usage: "softplus(x)",
         docs: "ln(1 + eˣ) = max(x, 0) + log1p(e^(−|x|)), a smooth max(x, 0), without overflow or cancellation.",
         shape: one_scalar,
+        units: Units::Plain,
         lower: |g, a| Lowered::scalar(softplus(g, a[0].node())),
         accuracy: "4 / 3 / 5",
     },

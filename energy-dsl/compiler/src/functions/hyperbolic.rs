@@ -3,7 +3,7 @@
 use super::elementary::one_scalar;
 use super::exponential::expm1;
 use super::power_series::polynomial;
-use super::{Function, Lowered};
+use super::{Function, Lowered, Units};
 use crate::graph::{Form, Graph, NodeId, Primitive, Rule};
 
 pub(super) const FUNCTIONS: &[Function] = &[
@@ -13,6 +13,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
         docs: "Hyperbolic sine (eˣ − e⁻ˣ)/2, accurate near 0: by its series for |x| < 1. It overflows where \
              e^|x| does.",
         shape: one_scalar,
+        units: Units::Plain,
         lower: |g, a| Lowered::scalar(sinh(g, a[0].node())),
         accuracy: "2 / 2 / 2",
     },
@@ -21,6 +22,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
         usage: "cosh(x)",
         docs: "Hyperbolic cosine (eˣ + e⁻ˣ)/2. It overflows where e^|x| does.",
         shape: one_scalar,
+        units: Units::Plain,
         lower: |g, a| Lowered::scalar(cosh(g, a[0].node())),
         accuracy: "2 / 2 / 2",
     },
@@ -29,6 +31,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
         usage: "tanh(x)",
         docs: "Hyperbolic tangent, accurate near 0 and, with its derivatives, where it tends to ±1.",
         shape: one_scalar,
+        units: Units::Plain,
         lower: |g, a| Lowered::scalar(tanh(g, a[0].node())),
         accuracy: "4 / 5 / 7",
     },

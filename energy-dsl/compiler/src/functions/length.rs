@@ -4,7 +4,7 @@
 //! I − n nᵀ: ∇r = n and ∇²r = P/r. The diagonal of P is the sum of the *other* squares, never 1 − nᵢ².
 
 use super::inner_product::inner_product;
-use super::{Function, Lowered, Shape, parallelogram};
+use super::{Function, Lowered, Shape, Units, parallelogram};
 use crate::graph::{Form, Graph, NodeId, Origin, Primitive, Rule, upper};
 use energy_runtime::Flag;
 
@@ -15,6 +15,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
         docs: "Length of a vector or quaternion. At 0 it contributes no derivatives, and they are flagged. \
                `norm(d) - L` and its square are robust primitives.",
         shape: vector_to_scalar,
+        units: Units::First,
         lower: norm,
         accuracy: "2 / 2 / 6",
     },
@@ -23,6 +24,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
         usage: "norm_squared(d) or ‖d‖²",
         docs: "d·d.",
         shape: vector_to_scalar,
+        units: Units::Power(2.0),
         lower: norm_squared,
         accuracy: "3 / 1 / 0",
     },
@@ -32,6 +34,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
         docs: "d/‖d‖ of a vector or quaternion. For a dual quaternion, both parts are divided by the norm of the \
              real part. At 0 the result is taken as 0 and flagged.",
         shape: unit_shape,
+        units: Units::Direction,
         lower: unit,
         accuracy: "2 / 5 / 8",
     },

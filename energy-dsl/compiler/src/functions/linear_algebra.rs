@@ -6,7 +6,7 @@ use super::inner_product::inner_product;
 use super::polar::recognise_stretch_trace;
 use super::rotated::recognise_rotated_product;
 use super::spatial_polar::distance_to_rotation;
-use super::{Function, Lowered, Shape};
+use super::{Function, Lowered, Shape, Units};
 use crate::graph::{Form, Graph, NodeId, Origin};
 
 pub(super) const FUNCTIONS: &[Function] = &[
@@ -17,6 +17,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
              robust primitive, the cosine between a and b. In `dot(rotate(q, n), transform(q, p) - x)`, p is not \
              rotated, because a rotation preserves n·p.",
         shape: dot_shape,
+        units: Units::Scaled,
         lower: dot,
         accuracy: "",
     },
@@ -25,6 +26,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
         usage: "cross(a, b) or a × b",
         docs: "Cross product of two 3-vectors; the product of two scalars.",
         shape: cross_shape,
+        units: Units::Scaled,
         lower: cross,
         accuracy: "",
     },
@@ -33,6 +35,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
         usage: "outer(a, b)",
         docs: "Outer product a bᵀ of two vectors.",
         shape: outer_shape,
+        units: Units::Scaled,
         lower: outer,
         accuracy: "",
     },
@@ -41,6 +44,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
         usage: "ddot(A, B)",
         docs: "Inner product of two matrices, Σᵢⱼ Aᵢⱼ Bᵢⱼ = tr AᵀB.",
         shape: ddot_shape,
+        units: Units::Scaled,
         lower: dot,
         accuracy: "",
     },
@@ -49,6 +53,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
         usage: "transpose(A) or Aᵀ",
         docs: "Transpose of a matrix. A vector becomes a row.",
         shape: transpose_shape,
+        units: Units::First,
         lower: transpose,
         accuracy: "",
     },
@@ -57,6 +62,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
         usage: "trace(A)",
         docs: "Sum of the diagonal of a square matrix.",
         shape: square_to_scalar,
+        units: Units::First,
         lower: trace,
         accuracy: "",
     },
@@ -66,6 +72,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
         docs: "Determinant of a 2×2, 3×3 or 4×4 matrix. That of `transpose(F) * F` is computed from F without \
                cancellation, as ‖a × b‖² or det(F)².",
         shape: square_to_scalar,
+        units: Units::PowerOfSize(0),
         lower: det,
         accuracy: "",
     },
@@ -74,6 +81,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
         usage: "inverse(A)",
         docs: "Inverse of a 2×2, 3×3 or 4×4 matrix.",
         shape: square_to_square,
+        units: Units::Power(-1.0),
         lower: inverse,
         accuracy: "",
     },
@@ -82,6 +90,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
         usage: "adjugate(A)",
         docs: "det(A) A⁻¹ of a 2×2, 3×3 or 4×4 matrix, without division. It is exact for integers.",
         shape: square_to_square,
+        units: Units::PowerOfSize(-1),
         lower: adjugate,
         accuracy: "",
     },
@@ -90,6 +99,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
         usage: "scaled_det(A)",
         docs: "det(A) times the power of two s = power_of_two(det(A)), so 1 or more and below 2, without unit.",
         shape: square_to_scalar,
+        units: Units::Number,
         lower: |g, a| {
             let determinant = det(g, a).node();
             let scale = g.power_of_two_scale(determinant);
@@ -103,6 +113,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
         docs: "adjugate(A) times power_of_two(det(A)): A⁻¹ times scaled_det(A), without division. It brings rest \
              shapes of any size near 1, and is exact for integers.",
         shape: square_to_square,
+        units: Units::Power(-1.0),
         lower: |g, a| {
             let determinant = det(g, a).node();
             let scale = g.power_of_two_scale(determinant);
@@ -116,6 +127,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
         usage: "identity(2) or identity(3)",
         docs: "Identity matrix.",
         shape: identity_shape,
+        units: Units::Number,
         lower: identity,
         accuracy: "0",
     },
@@ -124,6 +136,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
         usage: "columns(a, b, …)",
         docs: "The matrix with the given columns.",
         shape: columns_shape,
+        units: Units::Same,
         lower: columns,
         accuracy: "0",
     },
@@ -132,6 +145,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
         usage: "v[i], v.x, q.w, M[i][j]",
         docs: "A component of a vector, a row of a matrix or an entry of an array, counted from 0.",
         shape: component_shape,
+        units: Units::Component,
         lower: component,
         accuracy: "0",
     },
@@ -140,6 +154,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
         usage: "vector(x, y, …)",
         docs: "The vector with the given components.",
         shape: vector_shape,
+        units: Units::Same,
         lower: vector,
         accuracy: "0",
     },

@@ -1,36 +1,79 @@
 //! Comparisons for the condition of `if`.
 
-use super::{Function, Lowered, Shape};
+use super::{Function, Lowered, Shape, Units};
 use crate::graph::Graph;
 
 pub(super) const FUNCTIONS: &[Function] = &[
-    Function { name: "<", usage: "a < b", docs: "Less than.", shape: compare, lower: less, accuracy: "" },
+    Function {
+        name: "<",
+        usage: "a < b",
+        docs: "Less than.",
+        shape: compare,
+        units: Units::Compared,
+        lower: less,
+        accuracy: "",
+    },
     Function {
         name: "<=",
         usage: "a <= b",
         docs: "Less than or equal to.",
         shape: compare,
+        units: Units::Compared,
         lower: less_or_equal,
         accuracy: "",
     },
-    Function { name: ">", usage: "a > b", docs: "Greater than.", shape: compare, lower: greater, accuracy: "" },
+    Function {
+        name: ">",
+        usage: "a > b",
+        docs: "Greater than.",
+        shape: compare,
+        units: Units::Compared,
+        lower: greater,
+        accuracy: "",
+    },
     Function {
         name: ">=",
         usage: "a >= b",
         docs: "Greater than or equal to.",
         shape: compare,
+        units: Units::Compared,
         lower: greater_or_equal,
         accuracy: "",
     },
-    Function { name: "==", usage: "a == b", docs: "Exactly equal.", shape: compare, lower: equal, accuracy: "" },
-    Function { name: "!=", usage: "a != b", docs: "Not equal.", shape: compare, lower: not_equal, accuracy: "" },
-    Function { name: "&&", usage: "p && q", docs: "Both conditions hold.", shape: connect, lower: and, accuracy: "" },
+    Function {
+        name: "==",
+        usage: "a == b",
+        docs: "Exactly equal.",
+        shape: compare,
+        units: Units::Compared,
+        lower: equal,
+        accuracy: "",
+    },
+    Function {
+        name: "!=",
+        usage: "a != b",
+        docs: "Not equal.",
+        shape: compare,
+        units: Units::Compared,
+        lower: not_equal,
+        accuracy: "",
+    },
+    Function {
+        name: "&&",
+        usage: "p && q",
+        docs: "Both conditions hold.",
+        shape: connect,
+        units: Units::Number,
+        lower: and,
+        accuracy: "",
+    },
     Function {
         name: "||",
         usage: "p || q",
         docs: "At least one condition \
         holds.",
         shape: connect,
+        units: Units::Number,
         lower: or,
         accuracy: "",
     },

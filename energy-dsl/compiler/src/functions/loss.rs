@@ -1,7 +1,7 @@
 //! Robust losses, quadratic near 0 and linear far away.
 
 use super::elementary::two_scalars;
-use super::{Function, Lowered};
+use super::{Function, Lowered, Units};
 use crate::graph::{Form, Graph, NodeId, Primitive, Rule};
 use energy_runtime::Flag;
 
@@ -12,6 +12,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
         docs: "x²/2 if |x| ≤ δ, else δ (|x| − δ/2), with δ > 0. At |x| = δ the second derivative is the inner one, \
              and flagged.",
         shape: two_scalars,
+        units: Units::SquareOfSame,
         lower: |g, a| Lowered::scalar(huber(g, a[0].node(), a[1].node())),
         accuracy: "2 / 0 / 0",
     },
@@ -20,6 +21,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
         usage: "pseudo_huber(x, δ)",
         docs: "δ² (√(1 + (x/δ)²) − 1), δ > 0, accurate near 0.",
         shape: two_scalars,
+        units: Units::SquareOfSame,
         lower: |g, a| Lowered::scalar(pseudo_huber(g, a[0].node(), a[1].node())),
         accuracy: "4 / 4 / 8",
     },

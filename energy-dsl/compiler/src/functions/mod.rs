@@ -1,4 +1,5 @@
-//! The functions of the language, one row each: name, description, shape rule, lowering and accuracy. Operators are
+//! The functions of the language, one row each: name, description, shape rule, effect on units, lowering and
+//! accuracy. Operators are
 //! functions, too. The derivatives of a robust primitive are next to its lowering.
 
 mod angle;
@@ -26,8 +27,10 @@ mod sinc;
 mod singular;
 mod spatial_polar;
 mod trigonometric;
+mod units;
 
 pub use shape::{Lowered, Shape};
+pub use units::Units;
 
 use crate::graph::{Ending, Graph, Recogniser};
 
@@ -41,6 +44,8 @@ pub struct Function {
     pub docs: &'static str,
     /// Returns the shape of the result, or a message that names the expected shapes.
     pub shape: fn(&[Shape]) -> Result<Shape, String>,
+    /// The effect on units.
+    pub units: Units,
     /// Returns the nodes of the result.
     pub lower: fn(&mut Graph, &[Lowered]) -> Lowered,
     /// Bound on the relative rounding error of value, first and second derivatives in units of roundoff, for exact

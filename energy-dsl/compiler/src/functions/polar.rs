@@ -3,7 +3,7 @@
 use super::length::unit;
 use super::linear_algebra::cross;
 use super::spatial_polar::{Polar, polar};
-use super::{Function, Lowered, Shape};
+use super::{Function, Lowered, Shape, Units};
 use crate::graph::{Graph, NodeId, Origin};
 
 pub(super) const FUNCTIONS: &[Function] = &[
@@ -17,6 +17,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
              S ≥ 0; the result is flagged where the columns are parallel. For a 3×3 matrix, `transpose(R) * F` is S, \
              `ddot(R, F)` is tr S, and `ddot(F - R, F - R)` is the squared distance to R.",
         shape: |shapes| deformation(shapes).map(|_| shapes[0]),
+        units: Units::Number,
         lower: |g, a| rotation(g, &a[0]),
         accuracy: "",
     },
@@ -27,6 +28,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
              the signed singular values of F: their sum is trace(S), their product det(S), the sum of their squares \
              ddot(S, S).",
         shape: |shapes| deformation(shapes).map(|columns| Shape::Matrix(columns, columns)),
+        units: Units::First,
         lower: |g, a| stretch(g, &a[0]),
         accuracy: "",
     },

@@ -6,7 +6,7 @@
 
 use super::length::direction;
 use super::sinc::{assume_at_most_a_quarter_turn, cos_sqrt, sinc_sqrt};
-use super::{Function, Lowered, Shape};
+use super::{Function, Lowered, Shape, Units};
 use crate::graph::{Form, Graph, NodeId, Origin, Primitive, Rule, upper};
 use energy_runtime::Flag;
 
@@ -16,6 +16,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
         usage: "quat(w, x, y, z) or quat(w, v)",
         docs: "The quaternion w + x i + y j + z k.",
         shape: quat_shape,
+        units: Units::Same,
         lower: |_, a| Lowered { shape: Shape::Quat, parts: joined(a) },
         accuracy: "0",
     },
@@ -24,6 +25,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
         usage: "dual_quat(q, e)",
         docs: "The dual quaternion q + ε e.",
         shape: |s| exactly(s, &[Shape::Quat, Shape::Quat], Shape::DualQuat, "takes two quaternions"),
+        units: Units::Parts,
         lower: |_, a| Lowered { shape: Shape::DualQuat, parts: joined(a) },
         accuracy: "0",
     },
@@ -32,6 +34,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
         usage: "twist(θ, t)",
         docs: "The twist of a rotation vector θ and a translation t.",
         shape: |s| exactly(s, &[Shape::Vector(3), Shape::Vector(3)], Shape::Twist, "takes two 3-vectors"),
+        units: Units::Parts,
         lower: |_, a| Lowered { shape: Shape::Twist, parts: joined(a) },
         accuracy: "0",
     },
@@ -40,6 +43,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
         usage: "angular(ξ)",
         docs: "The part θ of the twist (θ, t).",
         shape: |s| exactly(s, &[Shape::Twist], Shape::Vector(3), "takes a twist"),
+        units: Units::FirstPart,
         lower: |_, a| Lowered::vector(&a[0].parts[..3]),
         accuracy: "0",
     },
@@ -48,6 +52,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
         usage: "linear(ξ)",
         docs: "The part t of the twist (θ, t).",
         shape: |s| exactly(s, &[Shape::Twist], Shape::Vector(3), "takes a twist"),
+        units: Units::SecondPart,
         lower: |_, a| Lowered::vector(&a[0].parts[3..]),
         accuracy: "0",
     },
@@ -56,6 +61,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
         usage: "real(q)",
         docs: "The real part: a quaternion for a dual quaternion, the scalar w for a quaternion.",
         shape: real_shape,
+        units: Units::FirstPart,
         lower: real,
         accuracy: "0",
     },
@@ -64,6 +70,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
         usage: "dual(q)",
         docs: "The dual part of a dual quaternion, as a quaternion.",
         shape: |s| exactly(s, &[Shape::DualQuat], Shape::Quat, "takes a dual quaternion"),
+        units: Units::SecondPart,
         lower: |_, a| quaternion(&a[0].parts[4..]),
         accuracy: "0",
     },
@@ -72,6 +79,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
         usage: "imaginary(q)",
         docs: "The vector (x, y, z) of a quaternion.",
         shape: |s| exactly(s, &[Shape::Quat], Shape::Vector(3), "takes a quaternion"),
+        units: Units::FirstPart,
         lower: |_, a| Lowered::vector(&a[0].parts[1..]),
         accuracy: "0",
     },
@@ -80,6 +88,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
         usage: "conjugate(q)",
         docs: "q*, with the vector part negated. For a dual quaternion, this applies to both parts.",
         shape: conjugate_shape,
+        units: Units::First,
         lower: conjugate,
         accuracy: "0",
     },
@@ -88,6 +97,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
         usage: "rotate(q, v)",
         docs: "q v q*: rotates the vector v by a unit quaternion, or by the unit real part of a dual quaternion.",
         shape: rotate_shape,
+        units: Units::Rotated,
         lower: |g, a| Lowered::vector(rotate(g, &a[0].parts[..4], &a[1].parts)),
         accuracy: "",
     },
@@ -99,6 +109,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
         shape: |s| {
             exactly(s, &[Shape::DualQuat, Shape::Vector(3)], Shape::Vector(3), "takes a dual quaternion and a 3-vector")
         },
+        units: Units::Transformed,
         lower: transform,
         accuracy: "",
     },
@@ -108,6 +119,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
         docs: "The unit quaternion (cos ‖θ‖, θ sin ‖θ‖/‖θ‖) of half a rotation vector θ: it rotates by 2‖θ‖. Regular \
              at θ = 0.",
         shape: |s| exactly(s, &[Shape::Vector(3)], Shape::Quat, "takes a 3-vector"),
+        units: Units::Orientation,
         lower: |g, a| quaternion(&rotation(g, &a[0].parts)),
         accuracy: "",
     },
@@ -116,6 +128,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
         usage: "rotation_matrix(q)",
         docs: "The 3×3 rotation matrix of a unit quaternion.",
         shape: |s| exactly(s, &[Shape::Quat], Shape::Matrix(3, 3), "takes a quaternion"),
+        units: Units::Orientation,
         lower: rotation_matrix,
         accuracy: "",
     },

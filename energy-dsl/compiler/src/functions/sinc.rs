@@ -5,7 +5,7 @@
 
 use super::elementary::one_scalar;
 use super::power_series::{Interval, economised, polynomial};
-use super::{Function, Lowered};
+use super::{Function, Lowered, Units};
 use crate::graph::{Form, Graph, NodeId, Primitive, Rule};
 
 pub(super) const FUNCTIONS: &[Function] = &[
@@ -14,6 +14,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
         usage: "cos_sqrt(y)",
         docs: "cos √y, y ≥ 0. Regular at 0, with the derivative −½ sinc_sqrt(y).",
         shape: one_scalar,
+        units: Units::Plain,
         lower: |g, a| Lowered::scalar(cos_sqrt(g, a[0].node())),
         accuracy: "4 / 3 / 6 for y ≤ 1.5",
     },
@@ -22,6 +23,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
         usage: "sinc_sqrt(y)",
         docs: "sin √y / √y, y ≥ 0. Regular at 0, where it is 1.",
         shape: one_scalar,
+        units: Units::Plain,
         lower: |g, a| Lowered::scalar(sinc_sqrt(g, a[0].node())),
         accuracy: "5 / 6 / 10 for y ≤ 6.5",
     },
@@ -30,6 +32,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
         usage: "sinc(x)",
         docs: "sin x / x. Regular at 0, where it is 1.",
         shape: one_scalar,
+        units: Units::Plain,
         lower: |g, a| Lowered::scalar(sinc(g, a[0].node())),
         accuracy: "2 / 6 / 12 for |x| ≤ 1.5",
     },
@@ -38,6 +41,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
         usage: "cosc(x)",
         docs: "(1 − cos x)/x² = ½ sinc²(x/2). Regular at 0, where it is ½.",
         shape: one_scalar,
+        units: Units::Plain,
         lower: |g, a| Lowered::scalar(cosc(g, a[0].node())),
         accuracy: "5 / 9 / 16 for |x| ≤ 1.5",
     },

@@ -5,7 +5,7 @@
 
 use super::length::common_scale;
 use super::spatial_polar::signed_singular_values;
-use super::{Function, Lowered, Shape, polar::deformation};
+use super::{Function, Lowered, Shape, Units, polar::deformation};
 use crate::graph::{Form, Graph, NodeId, Primitive, Rule, Spectrum};
 
 pub(super) const FUNCTIONS: &[Function] = &[Function {
@@ -17,6 +17,7 @@ pub(super) const FUNCTIONS: &[Function] = &[Function {
            derivative there and are flagged. So are those at which two sum to 0, or one of a 3×2 matrix is 0, unless \
            the expression is even.",
     shape: |shapes| deformation(shapes).map(Shape::Vector),
+    units: Units::First,
     lower: |g, a| singular_values(g, &a[0]),
     accuracy: "",
 }];

@@ -1,7 +1,7 @@
 //! The tangent, and the inverse sine, cosine and tangent.
 
 use super::elementary::one_scalar;
-use super::{Function, Lowered};
+use super::{Function, Lowered, Units};
 use crate::graph::{Form, Graph, NodeId, Primitive, Rule};
 use energy_runtime::Flag;
 
@@ -11,6 +11,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
         usage: "tan(x)",
         docs: "Tangent of an angle in radians.",
         shape: one_scalar,
+        units: Units::Plain,
         lower: |g, a| Lowered::scalar(tan(g, a[0].node())),
         accuracy: "3 / 5 / 7",
     },
@@ -20,6 +21,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
         docs: "The angle in [−π/2, π/2] whose sine is x. If |x| > 1, x is clamped and flagged. If |x| ≥ 1, the \
              derivatives are taken as 0 and flagged.",
         shape: one_scalar,
+        units: Units::Plain,
         lower: |g, a| Lowered::scalar(arc(g, a[0].node(), Primitive::ArcSine)),
         accuracy: "3 / 3 / 8",
     },
@@ -29,6 +31,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
         docs: "The angle in [0, π] whose cosine is x, clamped and flagged like `asin`. `acos(dot(unit(a), unit(b)))` \
              is compiled as `angle(a, b)`.",
         shape: one_scalar,
+        units: Units::Plain,
         lower: |g, a| Lowered::scalar(acos(g, a[0].node())),
         accuracy: "3 / 3 / 8",
     },
@@ -37,6 +40,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
         usage: "atan(x)",
         docs: "The angle in (−π/2, π/2) whose tangent is x. For a quotient y/x, use `atan2(y, x)`.",
         shape: one_scalar,
+        units: Units::Plain,
         lower: |g, a| Lowered::scalar(atan(g, a[0].node())),
         accuracy: "1 / 4 / 6",
     },

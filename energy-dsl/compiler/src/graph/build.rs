@@ -392,6 +392,56 @@ impl Graph {
         power
     }
 
+    /// Creates an operation on nodes of this graph by its constructor, which simplifies.
+    pub(crate) fn rebuilt(&mut self, op: Op) -> NodeId {
+        match op {
+            Op::Constant(bits) => self.constant(f64::from_bits(bits)),
+            Op::Truth(value) => self.truth(value),
+            Op::Cautious => self.cautious(),
+            Op::Pi => self.pi(),
+            Op::Input(input) => self.input(input),
+            Op::Neg(a) => self.neg(a),
+            Op::Add(a, b) => self.add(a, b),
+            Op::Sub(a, b) => self.sub(a, b),
+            Op::Mul(a, b) => self.mul(a, b),
+            Op::Div(a, b) => self.div(a, b),
+            Op::Sqrt(a) => self.sqrt(a),
+            Op::Abs(a) => self.abs(a),
+            Op::Min(a, b) => self.min(a, b),
+            Op::Max(a, b) => self.max(a, b),
+            Op::Sin(a) => self.sin(a),
+            Op::Cos(a) => self.cos(a),
+            Op::Exp(a) => self.exp(a),
+            Op::Ln(a) => self.ln(a),
+            Op::Atan2(a, b) => self.atan2(a, b),
+            Op::ModerateAtan2(a, b) => self.moderate_atan2(a, b),
+            Op::Pow(a, b) => self.plain_pow(a, b),
+            Op::FusedMulSub(a, b, c) => self.fused_mul_sub(a, b, c),
+            Op::MulAdd(a, b, c) => {
+                let minus = self.neg(a);
+                self.neg_mul_add(minus, b, c)
+            }
+            Op::NegMulAdd(a, b, c) => self.neg_mul_add(a, b, c),
+            Op::SumError(a, b) => self.sum_error(a, b),
+            Op::DifferenceError(a, b) => self.difference_error(a, b),
+            Op::ProductError(a, b) => self.product_error(a, b),
+            Op::RootError(a, b) => self.root_error(a, b),
+            Op::PowerOfTwoScale(a) => self.power_of_two_scale(a),
+            Op::Less(a, b) => self.less(a, b),
+            Op::Precedes(a, b) => self.precedes(a, b),
+            Op::LessOrEqual(a, b) => self.less_or_equal(a, b),
+            Op::Equal(a, b) => self.equal(a, b),
+            Op::IsModerate(a, degree) => self.is_moderate(a, degree),
+            Op::And(a, b) => self.and(a, b),
+            Op::Or(a, b) => self.or(a, b),
+            Op::Not(a) => self.not(a),
+            Op::Select(mask, a, b) => self.select(mask, a, b),
+            Op::Rule(_) | Op::MulSub(..) | Op::NegMulSub(..) => {
+                unreachable!("compiler bug: resolved, and not yet fused")
+            }
+        }
+    }
+
     fn integer_power(&mut self, a: NodeId, exponent: u32) -> NodeId {
         match exponent {
             0 => self.constant(1.0),

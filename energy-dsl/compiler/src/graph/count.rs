@@ -1,4 +1,4 @@
-use super::{Graph, NodeId, Op};
+use super::{Graph, NodeId};
 use energy_runtime::OperationCount;
 
 /// Returns the nodes needed to compute `outputs`, in topological order. Rules are replaced by their values.
@@ -19,25 +19,6 @@ pub fn reachable(graph: &Graph, outputs: &[NodeId]) -> Vec<NodeId> {
 #[must_use]
 pub fn count(graph: &Graph, outputs: &[NodeId]) -> OperationCount {
     let mut count = OperationCount::default();
-    for node in reachable(graph, outputs) {
-        match graph.fused(node) {
-            Op::Constant(_) | Op::Truth(_) | Op::Cautious | Op::Pi | Op::Input(_) => {}
-            Op::Rule(_) => unreachable!("resolved"),
-            Op::Div(..) | Op::Sqrt(_) => count.divisions_and_roots += 1,
-            Op::Sin(_) | Op::Cos(_) | Op::Exp(_) | Op::Ln(_) | Op::Atan2(..) | Op::ModerateAtan2(..) | Op::Pow(..) => {
-                count.transcendental += 1
-            }
-            Op::SumError(..) | Op::DifferenceError(..) | Op::ProductError(..) | Op::RootError(..) => {
-                count.error_terms += 1
-            }
-            // Counts the product here; its error term is counted apart.
-            Op::FusedMulSub(..) => {
-                count.basic += 1;
-                count.error_terms += 1;
-            }
-            Op::MulAdd(..) | Op::MulSub(..) | Op::NegMulAdd(..) | Op::NegMulSub(..) => count.fused += 1,
-            _ => count.basic += 1,
-        }
-    }
+    reachable(graph, outputs).into_iter().for_each(|node| graph.fused(node).add_to(&mut count));
     count
 }

@@ -1,5 +1,6 @@
 //! Evaluates a graph over any number type: doubles, dual numbers, multi-precision.
 
+use super::node::Computed;
 use super::{Graph, Input, NodeId, Op, reachable};
 use energy_runtime::{Baseline, Inputs, Mask, Number};
 
@@ -10,15 +11,6 @@ pub struct Interpreter {
     operations: Vec<Op>,
     /// The places of the outputs.
     outputs: Vec<NodeId>,
-}
-
-/// The result of an operation.
-#[derive(Clone)]
-enum Computed<T: Number> {
-    /// A number of the evaluated type.
-    Number(T),
-    /// A mask of the evaluated type.
-    Mask(T::Mask),
 }
 
 /// The results of the operations so far.
@@ -91,64 +83,18 @@ impl Interpreter {
     fn values<T: Number>(&self, inputs: &Inputs<'_, T>, precomputed: &[T]) -> Values<T> {
         let mut values = Values(Vec::with_capacity(self.operations.len()));
         for &op in &self.operations {
-            let value = apply(op, inputs, precomputed, |place| values.number(place), |place| values.mask(place));
+            let value = match op {
+                Op::Constant(bits) => Computed::Number(T::from_f64(f64::from_bits(bits))),
+                Op::Pi => Computed::Number(T::from_f64(0.0).atan2::<Baseline>(T::from_f64(-1.0))),
+                Op::Input(input) => Computed::Number(read(input, inputs, precomputed)),
+                Op::Cautious | Op::Truth(true) => Computed::Mask(!T::Mask::none()),
+                Op::Truth(false) => Computed::Mask(T::Mask::none()),
+                op => op.evaluate(|place| values.number(place), |place| values.mask(place)),
+            };
             values.0.push(value);
         }
         values
     }
-}
-
-/// Evaluates one operation; `n` and `m` return its operands.
-fn apply<T: Number>(
-    op: Op,
-    inputs: &Inputs<'_, T>,
-    precomputed: &[T],
-    n: impl Fn(NodeId) -> T,
-    m: impl Fn(NodeId) -> T::Mask,
-) -> Computed<T> {
-    Computed::Number(match op {
-        Op::Constant(bits) => T::from_f64(f64::from_bits(bits)),
-        Op::Pi => T::from_f64(0.0).atan2::<Baseline>(T::from_f64(-1.0)),
-        Op::Input(input) => read(input, inputs, precomputed),
-        Op::Neg(a) => -n(a),
-        Op::Add(a, b) => n(a) + n(b),
-        Op::Sub(a, b) => n(a) - n(b),
-        Op::Mul(a, b) => n(a) * n(b),
-        Op::Div(a, b) => n(a) / n(b),
-        Op::Sqrt(a) => n(a).sqrt(),
-        Op::Abs(a) => n(a).abs(),
-        Op::Min(a, b) => n(a).min(n(b)),
-        Op::Max(a, b) => n(a).max(n(b)),
-        Op::Sin(a) => n(a).sin::<Baseline>(),
-        Op::Cos(a) => n(a).cos::<Baseline>(),
-        Op::Exp(a) => n(a).exp::<Baseline>(),
-        Op::Ln(a) => n(a).ln::<Baseline>(),
-        Op::Atan2(a, b) => n(a).atan2::<Baseline>(n(b)),
-        Op::ModerateAtan2(a, b) => n(a).moderate_atan2::<Baseline>(n(b)),
-        Op::Pow(a, b) => n(a).powf::<Baseline>(n(b)),
-        Op::SumError(a, b) => n(a).sum_error(n(b)),
-        Op::DifferenceError(a, b) => n(a).difference_error(n(b)),
-        Op::ProductError(a, b) => n(a).product_error::<Baseline>(n(b)),
-        Op::FusedMulSub(a, b, c) => n(a).fused_mul_sub::<Baseline>(n(b), n(c)),
-        Op::RootError(a, b) => n(a).root_error::<Baseline>(n(b)),
-        Op::MulAdd(a, b, c) => n(a) * n(b) + n(c),
-        Op::MulSub(a, b, c) => n(a) * n(b) - n(c),
-        Op::NegMulSub(a, b, c) => -(n(a) * n(b)) - n(c),
-        Op::NegMulAdd(a, b, c) => n(c) - n(a) * n(b),
-        Op::PowerOfTwoScale(a) => n(a).power_of_two_scale(),
-        Op::Select(mask, a, b) => T::select(m(mask), n(a), n(b)),
-        Op::Less(a, b) => return Computed::Mask(n(a).less(n(b))),
-        Op::Precedes(a, b) => return Computed::Mask(n(a).precedes(n(b))),
-        Op::LessOrEqual(a, b) => return Computed::Mask(n(a).less_or_equal(n(b))),
-        Op::Equal(a, b) => return Computed::Mask(n(a).equal(n(b))),
-        Op::IsModerate(a, degree) => return Computed::Mask(n(a).is_moderate(degree)),
-        Op::Cautious => return Computed::Mask(!T::Mask::none()),
-        Op::Truth(value) => return Computed::Mask(if value { !T::Mask::none() } else { T::Mask::none() }),
-        Op::And(a, b) => return Computed::Mask(m(a) & m(b)),
-        Op::Or(a, b) => return Computed::Mask(m(a) | m(b)),
-        Op::Not(a) => return Computed::Mask(!m(a)),
-        Op::Rule(_) => unreachable!("compiler bug: rules are resolved to their values"),
-    })
 }
 
 fn read<T: Number>(input: Input, inputs: &Inputs<'_, T>, precomputed: &[T]) -> T {

@@ -21,6 +21,7 @@ mod sums;
 pub(crate) use contraction::Contraction;
 pub use count::{count, reachable};
 pub use interpret::Interpreter;
+pub(crate) use node::Spelling;
 pub use node::{Input, NodeId, Op};
 pub use ordinary::{Assumption, general, ordinary};
 pub(crate) use origin::Origin;

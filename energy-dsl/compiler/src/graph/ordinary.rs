@@ -141,58 +141,19 @@ impl Path {
                 _ => g.select(mask, yes.expect("open"), no.expect("open")),
             };
         }
-        let d = |o: NodeId| self.done[&g.resolve(o)];
-        match op {
-            Op::Sub(a, b) if g.is(a, 0.0) => g.minus_or_plus_zero(d(b)),
-            Op::Constant(_) | Op::Truth(_) | Op::Cautious | Op::Pi | Op::Input(_) => node,
-            Op::Neg(a) => g.neg(d(a)),
-            Op::Add(a, b) => g.add(d(a), d(b)),
-            Op::Sub(a, b) => g.sub(d(a), d(b)),
-            Op::Mul(a, b) | Op::Div(a, b) => {
-                let [x, y] = [a, b].map(d);
-                // Operands of an omitted scale are still rounded.
+        let rebuilt = op.with_operands(|o| self.done[&g.resolve(o)]);
+        match (op, rebuilt) {
+            (Op::Sub(a, _), Op::Sub(_, b)) if g.is(a, 0.0) => return g.minus_or_plus_zero(b),
+            // Operands of an omitted scale are still rounded.
+            (Op::Mul(a, b), Op::Mul(x, y)) | (Op::Div(a, b), Op::Div(x, y)) => {
                 for (scale, scaled) in [(a, y), (b, x)] {
                     if g.is_scale(g.resolve(scale)) {
                         g.round(scaled);
                     }
                 }
-                if matches!(op, Op::Mul(..)) { g.mul(x, y) } else { g.div(x, y) }
             }
-            Op::Sqrt(a) => g.sqrt(d(a)),
-            Op::Abs(a) => g.abs(d(a)),
-            Op::Min(a, b) => g.min(d(a), d(b)),
-            Op::Max(a, b) => g.max(d(a), d(b)),
-            Op::Sin(a) => g.sin(d(a)),
-            Op::Cos(a) => g.cos(d(a)),
-            Op::Exp(a) => g.exp(d(a)),
-            Op::Ln(a) => g.ln(d(a)),
-            Op::Atan2(a, b) => g.atan2(d(a), d(b)),
-            Op::ModerateAtan2(a, b) => g.moderate_atan2(d(a), d(b)),
-            Op::Pow(a, b) => g.plain_pow(d(a), d(b)),
-            Op::SumError(a, b) => g.sum_error(d(a), d(b)),
-            Op::DifferenceError(a, b) => g.difference_error(d(a), d(b)),
-            Op::ProductError(a, b) => g.product_error(d(a), d(b)),
-            Op::FusedMulSub(a, b, c) => g.fused_mul_sub(d(a), d(b), d(c)),
-            Op::RootError(a, b) => g.root_error(d(a), d(b)),
-            Op::PowerOfTwoScale(a) => g.power_of_two_scale(d(a)),
-            Op::Less(a, b) => g.less(d(a), d(b)),
-            Op::Precedes(a, b) => g.precedes(d(a), d(b)),
-            Op::LessOrEqual(a, b) => g.less_or_equal(d(a), d(b)),
-            Op::Equal(a, b) => g.equal(d(a), d(b)),
-            Op::IsModerate(a, degree) => g.is_moderate(d(a), degree),
-            Op::And(a, b) => g.and(d(a), d(b)),
-            Op::Or(a, b) => g.or(d(a), d(b)),
-            Op::Not(a) => g.not(d(a)),
-            Op::Select(..) => unreachable!("above"),
-            Op::MulAdd(a, b, c) => {
-                let [a, b, c] = [a, b, c].map(d);
-                let minus = g.neg(a);
-                g.neg_mul_add(minus, b, c)
-            }
-            Op::NegMulAdd(a, b, c) => g.neg_mul_add(d(a), d(b), d(c)),
-            Op::Rule(_) | Op::MulSub(..) | Op::NegMulSub(..) => {
-                unreachable!("compiler bug: resolved, and not yet fused")
-            }
+            _ => {}
         }
+        g.rebuilt(rebuilt)
     }
 }

@@ -1,7 +1,7 @@
 //! Proofs that a planted fault changes nothing in exact arithmetic.
 
 use crate::graph::{Graph, NodeId, Op};
-use crate::statements::Code;
+use crate::plan::Code;
 
 /// Returns whether two paths provably are the same function in exact arithmetic. Both are built into one hash-consed
 /// graph where rounding errors are 0; all outputs must be the same nodes.
@@ -73,6 +73,9 @@ impl Signed {
                 let magnitude = g.abs(at(a).node);
                 Self::of(g, magnitude)
             }
+            op if op.is_constant_in_exact_arithmetic() && !matches!(op, Op::PowerOfTwoScale(_)) => {
+                Self { node: g.constant(0.0), negative: false }
+            }
             other => {
                 // Written as 0 − a, which is always the same node; the negative of a difference may be one of two.
                 let zero = g.constant(0.0);
@@ -80,7 +83,7 @@ impl Signed {
                     let Self { node, negative } = at(id);
                     if negative { g.plain_difference(zero, node) } else { node }
                 });
-                let node = rebuilt(g, with_signs);
+                let node = g.rebuilt(with_signs);
                 Self::of(g, node)
             }
         }
@@ -100,38 +103,5 @@ impl Signed {
         let (a, b) = if a.node <= b.node { (a, b) } else { (b, a) };
         let sum = if a.negative == b.negative { g.add(a.node, b.node) } else { g.sub(a.node, b.node) };
         Self::of(g, sum).flipped(a.negative)
-    }
-}
-
-/// Rebuilds an operation that is not arithmetic by the simplifying constructors.
-fn rebuilt(g: &mut Graph, op: Op) -> NodeId {
-    match op {
-        Op::Constant(bits) => g.constant(f64::from_bits(bits)),
-        Op::Truth(value) => g.truth(value),
-        Op::Cautious => g.cautious(),
-        Op::Pi => g.pi(),
-        Op::Input(input) => g.input(input),
-        Op::Sqrt(a) => g.sqrt(a),
-        Op::Min(a, b) => g.min(a, b),
-        Op::Max(a, b) => g.max(a, b),
-        Op::Sin(a) => g.sin(a),
-        Op::Cos(a) => g.cos(a),
-        Op::Exp(a) => g.exp(a),
-        Op::Ln(a) => g.ln(a),
-        Op::Atan2(a, b) => g.atan2(a, b),
-        Op::ModerateAtan2(a, b) => g.moderate_atan2(a, b),
-        Op::Pow(a, b) => g.pow(a, b),
-        Op::SumError(..) | Op::DifferenceError(..) | Op::ProductError(..) | Op::RootError(..) => g.constant(0.0),
-        Op::PowerOfTwoScale(a) => g.power_of_two_scale(a),
-        Op::Select(mask, a, b) => g.select(mask, a, b),
-        Op::Less(a, b) => g.less(a, b),
-        Op::Precedes(a, b) => g.precedes(a, b),
-        Op::LessOrEqual(a, b) => g.less_or_equal(a, b),
-        Op::Equal(a, b) => g.equal(a, b),
-        Op::IsModerate(a, degree) => g.is_moderate(a, degree),
-        Op::And(a, b) => g.and(a, b),
-        Op::Or(a, b) => g.or(a, b),
-        Op::Not(a) => g.not(a),
-        _ => unreachable!("compiler bug: arithmetic is rebuilt with its signs, and rules are resolved to their values"),
     }
 }

@@ -10,8 +10,9 @@ use crate::graph::{Interpreter, NodeId};
 use crate::inspect::layout::{layout, methods};
 use crate::inspect::textbook::{file_programs, programs};
 use crate::lower::lower;
+use crate::plan::Plan;
 use crate::routines::{Routines, differentiate};
-use energy_runtime::{Inputs, Mask, Number, OperationCount};
+use energy_runtime::{Inputs, Mask, Number, OperationCount, RoutineKind};
 
 /// The two paths of a routine.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -65,7 +66,7 @@ impl Listing {
     fn of(programs: &[Program]) -> Result<Vec<Self>, Diagnostics> {
         let listing = |program: &Program| {
             let mut routines = differentiate(program, lower(program));
-            let code = emit(program, &routines);
+            let code = emit(program, &Plan::new(program, &routines));
             // What is counted later is not part of the compilation.
             routines.graph = routines.graph.paid_by(&Budget::new(Limits::NONE));
             Self { name: program.name.clone(), code, routines }
@@ -109,7 +110,7 @@ impl Listing {
     /// When an input slice is shorter than declared.
     #[must_use]
     pub fn evaluate<T: Number>(&self, routine: &str, path: Path, inputs: &Inputs<'_, T>) -> Option<Vec<Vec<T>>> {
-        let routine = self.routines.list.iter().find(|r| r.name == routine)?;
+        let routine = self.routines.find(RoutineKind::named(routine)?)?;
         let graph = &self.routines.graph;
         let groups = match &routine.general {
             Some(general) if path == Path::General || !self.mask(general.ordinary, inputs).all() => &general.groups,
@@ -121,7 +122,7 @@ impl Listing {
     /// Returns whether a routine of a declaration without rest shape raises a flag; `None` for an unknown routine.
     #[must_use]
     pub fn is_flagged<T: Number>(&self, routine: &str, inputs: &Inputs<'_, T>) -> Option<bool> {
-        let routine = self.routines.list.iter().find(|r| r.name == routine)?;
+        let routine = self.routines.find(RoutineKind::named(routine)?)?;
         let flags = routine.general.as_ref().map_or(routine.flags, |general| general.flags);
         Some(flags.into_iter().flatten().any(|flag| self.mask(flag, inputs).any()))
     }
@@ -140,9 +141,9 @@ impl Listing {
                 .expect("writing to a string succeeds");
         };
         for routine in &self.routines.list {
-            row(routine.name, self.routines.count(&routine.outputs()));
+            row(routine.kind.name(), self.routines.count(&routine.outputs()));
         }
-        let hessian = self.routines.list.iter().find(|routine| routine.name == "hessian");
+        let hessian = self.routines.find(RoutineKind::Hessian);
         let Some([value, gradient, triangle]) = hessian.map(|routine| &routine.groups[..]) else { return text };
         let points = gradient.len() / 3;
         for pinned in 0..points {
@@ -162,10 +163,10 @@ impl Listing {
     #[must_use]
     pub fn plans(&self) -> String {
         let mut text = String::new();
-        for plan in &self.routines.plans {
-            writeln!(text, "{} {}", self.name, plan.routine).expect("writing to a string succeeds");
-            let best = plan.routes.first().map_or(0, |route| route.cost);
-            for (place, route) in plan.routes.iter().enumerate() {
+        for routes in &self.routines.routes {
+            writeln!(text, "{} {}", self.name, routes.routine).expect("writing to a string succeeds");
+            let best = routes.list.first().map_or(0, |route| route.cost);
+            for (place, route) in routes.list.iter().enumerate() {
                 let why = match place {
                     0 => "taken: costs least".to_owned(),
                     _ if route.cost == best => "as cheap, but listed later".to_owned(),

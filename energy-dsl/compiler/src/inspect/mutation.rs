@@ -135,31 +135,9 @@ fn neighbour(input: Input) -> Input {
 
 fn symbol(op: Op) -> &'static str {
     match op {
-        Op::Constant(_) => "a constant",
-        Op::Input(_) => "an input",
-        Op::Neg(_) => "−a",
         Op::Add(a, b) if a == b => "a + a",
-        Op::Add(..) => "a + b",
-        Op::Sub(..) => "a − b",
-        Op::Mul(a, b) if a == b => "a a",
-        Op::Mul(..) => "a b",
-        Op::Div(..) => "a / b",
-        Op::MulAdd(..) => "a b + c",
-        Op::MulSub(..) => "a b − c",
-        Op::NegMulAdd(..) => "c − a b",
-        Op::NegMulSub(..) => "−a b − c",
-        Op::Sqrt(_) => "√a",
-        Op::Abs(_) => "|a|",
-        Op::Sin(_) => "sin a",
-        Op::Cos(_) => "cos a",
-        Op::Exp(_) => "exp a",
-        Op::Ln(_) => "ln a",
-        Op::Atan2(..) | Op::ModerateAtan2(..) => "atan2",
-        Op::Pow(..) => "a^b",
+        Op::Mul(a, b) if a == b => "a · a",
         Op::Max(a, b) if a == b => "an operand alone",
-        Op::Min(..) => "min",
-        Op::Max(..) => "max",
-        Op::Select(..) => "a selection",
-        _ => "another",
+        _ => op.description(),
     }
 }

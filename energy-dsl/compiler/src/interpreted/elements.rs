@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use super::{Interpreted, Layouts};
 use energy_runtime::tape::{Output, Places, TapeElements};
-use energy_runtime::{BatchError, Declaration, Flagged, Float};
+use energy_runtime::{BatchError, Declaration, Flagged, Float, RoutineKind};
 
 /// Elements of one declaration, bound to their parameters and rest shapes.
 ///
@@ -91,7 +91,7 @@ impl<S: Float> Elements<S> {
     /// When the declaration is a force or a residual, or the slices do not fit the range.
     pub fn values(&self, range: Range<usize>, x: &[S], energies: &mut [S]) -> Result<Flagged, EvaluateError> {
         let Layouts { value, .. } = self.layouts();
-        self.evaluate("value", range, x, None, &mut [output("energies", value, energies)])
+        self.evaluate(RoutineKind::Value, range, x, None, &mut [output("energies", value, energies)])
     }
 
     /// Writes U and ∂U/∂x (3 p numbers) of each element.
@@ -107,7 +107,7 @@ impl<S: Float> Elements<S> {
     ) -> Result<Flagged, EvaluateError> {
         let Layouts { value, gradient, .. } = self.layouts();
         let outputs = &mut [output("energies", value, energies), output("gradients", gradient, gradients)];
-        self.evaluate("gradient", range, x, None, outputs)
+        self.evaluate(RoutineKind::Gradient, range, x, None, outputs)
     }
 
     /// Writes U, ∂U/∂x (3 p numbers) and ∂²U/∂x² (3 p × 3 p numbers, row by row) of each element.
@@ -125,7 +125,7 @@ impl<S: Float> Elements<S> {
         let Layouts { value, gradient, hessian, .. } = self.layouts();
         let (energies, gradients) = (output("energies", value, energies), output("gradients", gradient, gradients));
         let outputs = &mut [energies, gradients, output("Hessians", hessian, hessians)];
-        self.evaluate("hessian", range, x, None, outputs)
+        self.evaluate(RoutineKind::Hessian, range, x, None, outputs)
     }
 
     /// Writes (∂²U/∂x²) v (3 p numbers) of each element.
@@ -140,7 +140,7 @@ impl<S: Float> Elements<S> {
         products: &mut [S],
     ) -> Result<Flagged, EvaluateError> {
         let Layouts { vectors, .. } = self.layouts();
-        self.evaluate("hessian_vector", range, x, Some(v), &mut [output("products", vectors, products)])
+        self.evaluate(RoutineKind::HessianVector, range, x, Some(v), &mut [output("products", vectors, products)])
     }
 
     /// Writes f(x, v) (3 p numbers) of each element.
@@ -149,7 +149,7 @@ impl<S: Float> Elements<S> {
     /// When the declaration is an energy or a residual, or the slices do not fit the range.
     pub fn forces(&self, range: Range<usize>, x: &[S], v: &[S], forces: &mut [S]) -> Result<Flagged, EvaluateError> {
         let Layouts { vectors, .. } = self.layouts();
-        self.evaluate("force", range, x, Some(v), &mut [output("forces", vectors, forces)])
+        self.evaluate(RoutineKind::Force, range, x, Some(v), &mut [output("forces", vectors, forces)])
     }
 
     /// Writes f(x, v) (3 p numbers), ∂f/∂x and ∂f/∂v (3 p × 3 p numbers each, row by row) of each element.
@@ -169,7 +169,7 @@ impl<S: Float> Elements<S> {
         let by_position = output("Jacobians by position", position, by_position);
         let by_velocity = output("Jacobians by velocity", velocity, by_velocity);
         let outputs = &mut [output("forces", vectors, forces), by_position, by_velocity];
-        self.evaluate("jacobians", range, x, Some(v), outputs)
+        self.evaluate(RoutineKind::Jacobians, range, x, Some(v), outputs)
     }
 
     /// Writes C (one number per row) and ∂C/∂x (3 p numbers per row) of each element.
@@ -185,7 +185,7 @@ impl<S: Float> Elements<S> {
     ) -> Result<Flagged, EvaluateError> {
         let Layouts { rows, jacobian, .. } = self.layouts();
         let outputs = &mut [output("constraints", rows, constraints), output("Jacobians", jacobian, jacobians)];
-        self.evaluate("constraint_jacobian", range, x, None, outputs)
+        self.evaluate(RoutineKind::ConstraintJacobian, range, x, None, outputs)
     }
 
     /// Writes r (one number per row) of each element. `u` holds all unknowns of each element, in declared order.
@@ -194,7 +194,7 @@ impl<S: Float> Elements<S> {
     /// When the declaration is of another kind than a residual, or the slices do not fit the range.
     pub fn residuals(&self, range: Range<usize>, u: &[S], residuals: &mut [S]) -> Result<Flagged, EvaluateError> {
         let Layouts { rows, .. } = self.layouts();
-        self.evaluate("residual", range, u, None, &mut [output("residuals", rows, residuals)])
+        self.evaluate(RoutineKind::Residual, range, u, None, &mut [output("residuals", rows, residuals)])
     }
 
     /// Writes r (one number per row) and ∂r/∂u (one number per row and unknown) of each element.
@@ -210,7 +210,7 @@ impl<S: Float> Elements<S> {
     ) -> Result<Flagged, EvaluateError> {
         let Layouts { rows, jacobian, .. } = self.layouts();
         let outputs = &mut [output("residuals", rows, residuals), output("Jacobians", jacobian, jacobians)];
-        self.evaluate("jacobian", range, u, None, outputs)
+        self.evaluate(RoutineKind::Jacobian, range, u, None, outputs)
     }
 
     fn layouts(&self) -> &Layouts {
@@ -219,15 +219,16 @@ impl<S: Float> Elements<S> {
 
     fn evaluate(
         &self,
-        routine: &'static str,
+        routine: RoutineKind,
         range: Range<usize>,
         x: &[S],
         v: Option<&[S]>,
         outputs: &mut [Output<'_, S>],
     ) -> Result<Flagged, EvaluateError> {
         let routines = self.tape.routines();
-        if routines.find(routine).is_none() && !(routine == "hessian" && routines.expansion.is_some()) {
-            return Err(EvaluateError::Routine { declaration: Arc::clone(&self.element.declaration), routine });
+        if !routines.has(routine) {
+            let declaration = Arc::clone(&self.element.declaration);
+            return Err(EvaluateError::Routine { declaration, routine: routine.name() });
         }
         Ok(self.tape.evaluate(routine, range, Places::Rows(x), v.map(Places::Rows), outputs)?)
     }

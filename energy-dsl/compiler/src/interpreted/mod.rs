@@ -5,7 +5,6 @@
 //! values and derivatives of a range of them to slices. All of this works in `f64` and in `f32`, and several threads
 //! may evaluate ranges of the same elements.
 
-mod description;
 mod elements;
 mod inputs;
 mod layouts;
@@ -19,10 +18,10 @@ use crate::check::Program;
 use crate::diagnostic::{Diagnostic, Diagnostics};
 use crate::inspect::{file_programs, programs};
 use crate::lower::lower;
+use crate::plan::Plan;
 use crate::properties::prove;
 use crate::routines::{Routines, differentiate};
-use crate::tape::{ElementCode, TooLarge};
-use description::description;
+use crate::tape::{TooLarge, tapes};
 use energy_runtime::{Declaration, tape};
 
 pub use elements::{Elements, EvaluateError};
@@ -56,7 +55,7 @@ pub use layouts::Layouts;
 pub struct Interpreted {
     declaration: Arc<Declaration>,
     inputs: Arc<Vec<InputNumbers>>,
-    code: Arc<ElementCode>,
+    plan: Arc<Plan>,
     routines: Arc<tape::Routines>,
     layouts: Arc<Layouts>,
     audit_samples: Option<usize>,
@@ -125,14 +124,13 @@ impl Interpreted {
     }
 
     fn new(program: &Program, routines: &Routines) -> Result<Self, TooLarge> {
-        let declaration = description(program, routines);
-        let code = ElementCode::new(program, routines);
+        let plan = Plan::new(program, routines);
         Ok(Self {
             inputs: Arc::new(InputNumbers::of(program)),
-            routines: Arc::new(code.record()?),
-            code: Arc::new(code),
-            layouts: Arc::new(Layouts::of(&declaration)),
-            declaration: Arc::new(declaration),
+            routines: Arc::new(tapes(&plan)?),
+            layouts: Arc::new(Layouts::of(&plan.declaration)),
+            declaration: Arc::new(plan.declaration.clone()),
+            plan: Arc::new(plan),
             audit_samples: program.audit_samples,
         })
     }

@@ -5,28 +5,38 @@ use std::sync::Arc;
 use super::Interpreted;
 use crate::graph::{Input, Op};
 use crate::inspect::{Mutation, faults, is_proved_equal};
-use crate::tape::{RoutineCode, are_numbers_of_results};
+use crate::plan::RoutinePlan;
+use crate::tape::tapes;
+use energy_runtime::RoutineKind;
 
 /// Routines that blocks are taken from.
-pub(super) const EVALUATED: [&str; 8] =
-    ["value", "gradient", "reduced_hessian", "force", "jacobians", "constraint_jacobian", "residual", "jacobian"];
+pub(super) const EVALUATED: [RoutineKind; 8] = [
+    RoutineKind::Value,
+    RoutineKind::Gradient,
+    RoutineKind::ReducedHessian,
+    RoutineKind::Force,
+    RoutineKind::Jacobians,
+    RoutineKind::ConstraintJacobian,
+    RoutineKind::Residual,
+    RoutineKind::Jacobian,
+];
 
 impl Interpreted {
     /// Returns every fault that can be planted in the numbers of the ordinary path. Operations that only choose between
     /// two equivalent forms are left alone: both are right.
     #[must_use]
     pub fn mutations(&self) -> Vec<Mutation> {
-        let evaluated = self.code.routines.iter().filter(|routine| EVALUATED.contains(&routine.name));
+        let evaluated = self.plan.routines.iter().filter(|routine| EVALUATED.contains(&routine.kind));
         // The unknowns of a residual need not come in threes. A fault must not read a number that does not exist.
         let unknowns = self.coordinates();
         let exists = |op: Op| !matches!(op, Op::Input(Input::Position(i)) if usize::from(i) >= unknowns);
         let mut list = Vec::new();
-        for RoutineCode { name, ordinary, .. } in std::iter::once(&self.code.rest).chain(evaluated) {
-            let is_number = are_numbers_of_results(ordinary);
+        for RoutinePlan { kind, ordinary, .. } in std::iter::once(&self.plan.rest).chain(evaluated) {
+            let (routine, is_number) = (kind.name(), ordinary.are_numbers_of_results());
             let statements = ordinary.statements.list().iter().enumerate();
             for (place, &before) in statements.filter(|(place, _)| is_number[*place]) {
                 let planted = faults(before).into_iter().filter(|(_, after)| *after != before && exists(*after));
-                list.extend(planted.map(|(fault, after)| Mutation { fault, routine: name, place, before, after }));
+                list.extend(planted.map(|(fault, after)| Mutation { fault, routine, place, before, after }));
             }
         }
         list
@@ -35,24 +45,24 @@ impl Interpreted {
     /// Returns the element with a fault planted.
     #[must_use]
     pub fn mutated(&self, mutation: &Mutation) -> Self {
-        let mut code = (*self.code).clone();
-        let routine = match code.routines.iter_mut().find(|routine| routine.name == mutation.routine) {
+        let mut plan = (*self.plan).clone();
+        let routine = match plan.routines.iter_mut().find(|routine| routine.kind.name() == mutation.routine) {
             Some(routine) => routine,
-            None => &mut code.rest,
+            None => &mut plan.rest,
         };
         routine.ordinary.statements = routine.ordinary.statements.with(mutation.place, mutation.after);
         routine.is_broken = true;
         // A fault that leaves too many numbers for a tape leaves the element sound: nothing notices it.
-        let routines = code.record().map_or_else(|_| Arc::clone(&self.routines), Arc::new);
-        Self { routines, code: Arc::new(code), ..self.clone() }
+        let routines = tapes(&plan).map_or_else(|_| Arc::clone(&self.routines), Arc::new);
+        Self { routines, plan: Arc::new(plan), ..self.clone() }
     }
 
     /// Returns whether a fault provably changes nothing in exact arithmetic. Both routines are built into one graph in
     /// which equal expressions are one node, rounding errors are 0, and 0 and 1 fold. `false` if that proves nothing.
     #[must_use]
     pub fn is_proved_equivalent(&self, mutation: &Mutation) -> bool {
-        let routine = self.code.routines.iter().find(|routine| routine.name == mutation.routine);
-        let sound = &routine.unwrap_or(&self.code.rest).ordinary;
+        let routine = self.plan.routines.iter().find(|routine| routine.kind.name() == mutation.routine);
+        let sound = &routine.unwrap_or(&self.plan.rest).ordinary;
         let mut broken = sound.clone();
         broken.statements = broken.statements.with(mutation.place, mutation.after);
         is_proved_equal(sound, &broken)

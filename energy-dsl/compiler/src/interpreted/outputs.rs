@@ -5,7 +5,9 @@ use std::sync::Arc;
 use super::Interpreted;
 use super::mutants::EVALUATED;
 use energy_runtime::tape::{Column, Input, Places, Routine, Routines, TapeElements, TermNumber};
-use energy_runtime::{Baseline, Flags, Float, Inputs, Kind, Mask, Number, Outputs, RestError, triangle_index};
+use energy_runtime::{
+    Baseline, Flags, Float, Inputs, Kind, Mask, Number, Outputs, RestError, RoutineKind, triangle_index,
+};
 
 /// The results of a routine by group, and its flags.
 type Results<T> = (Vec<Vec<T>>, Flags<T>);
@@ -20,7 +22,7 @@ impl Interpreted {
     /// When an input slice other than that of velocities has another length than declared.
     pub fn evaluate<S: Float>(&self, inputs: &Inputs<'_, S>) -> Result<Outputs<S>, RestError> {
         let element = self.one(inputs)?;
-        Ok(self.outputs(&|name| of_one(&element, name, inputs)))
+        Ok(self.outputs(&|routine| of_one(&element, routine, inputs)))
     }
 
     /// Checks a rest shape.
@@ -51,12 +53,9 @@ impl Interpreted {
     /// # Panics
     /// When an input slice other than that of velocities has another length than declared.
     pub fn routine<S: Float>(&self, name: &str, inputs: &Inputs<'_, S>) -> Result<Option<Results<S>>, RestError> {
-        let has_expansion = name == "hessian" && self.routines.expansion.is_some();
-        if self.routines.find(name).is_none() && !has_expansion {
-            return Ok(None);
-        }
+        let Some(kind) = RoutineKind::named(name).filter(|&kind| self.routines.has(kind)) else { return Ok(None) };
         let element = self.one(inputs)?;
-        Ok(Some(of_one(&element, name, inputs)))
+        Ok(Some(of_one(&element, kind, inputs)))
     }
 
     /// Evaluates all blocks over any number type, without fused operations.
@@ -68,7 +67,7 @@ impl Interpreted {
     /// When an input slice other than that of velocities is shorter than declared.
     pub fn evaluate_over<T: Number>(&self, inputs: &Inputs<'_, T>) -> Result<Outputs<T>, RestError> {
         let stored = self.stored(inputs)?;
-        Ok(self.outputs(&|name| over(&self.routines, name, inputs, &stored)))
+        Ok(self.outputs(&|routine| over(&self.routines, routine, inputs, &stored)))
     }
 
     /// Returns the outcomes of all comparisons on the ordinary path: the branches that an input takes.
@@ -78,7 +77,7 @@ impl Interpreted {
     pub fn branches(&self, inputs: &Inputs<'_, f64>) -> Result<Vec<bool>, RestError> {
         let stored = self.stored(inputs)?;
         let mut outcomes = Vec::new();
-        for routine in self.routines.list.iter().filter(|routine| EVALUATED.contains(&routine.name)) {
+        for routine in self.routines.list.iter().filter(|routine| EVALUATED.contains(&routine.kind)) {
             for term in terms(&self.routines) {
                 let numbers = read(&self.routines, routine, term, inputs, &stored);
                 let _ = routine.tape.run_noting::<f64, Baseline>(numbers, &mut |outcome| outcomes.push(outcome));
@@ -106,13 +105,13 @@ impl Interpreted {
     }
 
     /// Collects the blocks of a kind from its routines.
-    fn outputs<T: Number>(&self, run: &dyn Fn(&str) -> Results<T>) -> Outputs<T> {
+    fn outputs<T: Number>(&self, run: &dyn Fn(RoutineKind) -> Results<T>) -> Outputs<T> {
         let points = self.declaration.points.len();
         let (mut blocks, mut repeats) = (Vec::new(), Vec::new());
         let mut flags = [Flags::clear(), Flags::clear(), Flags::clear()];
         if matches!(self.declaration.kind, Kind::Energy | Kind::Constraint) {
-            let ((value, of_value), (gradient, of_gradient)) = (run("value"), run("gradient"));
-            let (hessian, of_hessian) = run("hessian");
+            let ((value, of_value), (gradient, of_gradient)) = (run(RoutineKind::Value), run(RoutineKind::Gradient));
+            let (hessian, of_hessian) = run(RoutineKind::Hessian);
             blocks.push(("energy", value[0].clone()));
             blocks.push(("grad", gradient[1].clone()));
             blocks.push(("hess", full_triangle(points, &hessian[2])));
@@ -122,7 +121,7 @@ impl Interpreted {
             flags = [of_value, of_gradient, of_hessian];
         }
         if matches!(self.declaration.kind, Kind::Force | Kind::Constraint) {
-            let ((force, of_force), (jacobians, of_jacobians)) = (run("force"), run("jacobians"));
+            let ((force, of_force), (jacobians, of_jacobians)) = (run(RoutineKind::Force), run(RoutineKind::Jacobians));
             blocks.push(("force", force[0].clone()));
             blocks.push(("dfdx", full_square(points, &jacobians[1])));
             blocks.push(("dfdv", full_square(points, &jacobians[2])));
@@ -133,11 +132,12 @@ impl Interpreted {
         }
         match self.declaration.kind {
             Kind::Constraint => {
-                let (jacobian, _) = run("constraint_jacobian");
+                let (jacobian, _) = run(RoutineKind::ConstraintJacobian);
                 blocks.extend([("constraint", jacobian[0].clone()), ("jacobian", jacobian[1].clone())]);
             }
             Kind::Residual => {
-                let ((residual, of_residual), (jacobian, of_jacobian)) = (run("residual"), run("jacobian"));
+                let (residual, of_residual) = run(RoutineKind::Residual);
+                let (jacobian, of_jacobian) = run(RoutineKind::Jacobian);
                 blocks.extend([("residual", residual[0].clone()), ("jacobian", jacobian[1].clone())]);
                 repeats.push(("jacobian", "residual", jacobian[0].clone()));
                 flags = [of_residual, of_jacobian, Flags::clear()];
@@ -149,18 +149,17 @@ impl Interpreted {
 }
 
 /// Evaluates a routine of one element in lanes.
-fn of_one<S: Float>(element: &TapeElements<S>, name: &str, inputs: &Inputs<'_, S>) -> Results<S> {
+fn of_one<S: Float>(element: &TapeElements<S>, routine: RoutineKind, inputs: &Inputs<'_, S>) -> Results<S> {
     let velocities = Some(inputs.velocities).filter(|velocities| !velocities.is_empty()).map(Places::Rows);
-    let (groups, [degenerate, kink]) = element.one(name, Places::Rows(inputs.positions), velocities);
+    let (groups, [degenerate, kink]) = element.one(routine, Places::Rows(inputs.positions), velocities);
     let mask = <S as Number>::Mask::from_bits;
     (groups, Flags { degenerate: mask(u32::from(degenerate)), kink: mask(u32::from(kink)) })
 }
 
 /// Evaluates a routine over any number type.
-fn over<T: Number>(routines: &Routines, name: &str, inputs: &Inputs<'_, T>, stored: &[T]) -> Results<T> {
-    let expansion = routines.expansion.as_ref().filter(|_| name == "hessian");
-    let routine = routines.find(if expansion.is_some() { "reduced_hessian" } else { name });
-    let routine = routine.expect("compiler bug: the kind decides the routines");
+fn over<T: Number>(routines: &Routines, routine: RoutineKind, inputs: &Inputs<'_, T>, stored: &[T]) -> Results<T> {
+    let (routine, expansion) = routines.expanded(routine);
+    let routine = routines.find(routine).expect("compiler bug: the kind decides the routines");
     let mut terms =
         terms(routines).map(|term| routine.run::<T, Baseline>(&read(routines, routine, term, inputs, stored)));
     let first = terms.next().expect("compiler bug: a sum has terms");

@@ -2,8 +2,9 @@
 
 use super::{Hazards, Whole, hazards, potential};
 use crate::check::Program;
-use crate::diff::{Coordinates, Plan, SecondOrder, first_order, second_order};
+use crate::diff::{Coordinates, Routes, SecondOrder, first_order, second_order};
 use crate::graph::{Graph, Input, NodeId, symmetric_index};
+use energy_runtime::RoutineKind;
 
 /// The shared parts of all routines, in reduced coordinates.
 struct Compliant<'a> {
@@ -26,7 +27,7 @@ pub(super) fn routines(
     program: &Program,
     c: &[NodeId],
     coordinates: &Coordinates,
-    plans: &mut Vec<Plan>,
+    routes: &mut Vec<Routes>,
 ) -> (Vec<Whole>, SecondOrder) {
     let parameter = |g: &mut Graph, from_end: usize| {
         let number = program.parameters_size() - from_end;
@@ -37,18 +38,18 @@ pub(super) fn routines(
     let half = g.constant(0.5);
     let scaled = g.mul(half, square);
     let value = g.mul(stiffness, scaled);
-    let (energy, plan) = second_order(g, "hessian", value, coordinates);
-    plans.push(plan);
-    let (jacobian, plan) = first_order(g, "constraint_jacobian", c, coordinates, None);
-    plans.push(plan);
+    let (energy, taken) = second_order(g, RoutineKind::Hessian.name(), value, coordinates);
+    routes.push(taken);
+    let (jacobian, taken) = first_order(g, RoutineKind::ConstraintJacobian.name(), c, coordinates, None);
+    routes.push(taken);
     let mut hessians = Vec::with_capacity(c.len());
     for &row in c {
-        let (second, plan) = second_order(g, "constraint_hessian", row, coordinates);
+        let (second, taken) = second_order(g, RoutineKind::ConstraintHessian.name(), row, coordinates);
         hessians.push(second.hessian);
-        plans.push(plan);
+        routes.push(taken);
     }
-    let (mut gradient, plan) = first_order(g, "gauss_newton", &[value], coordinates, None);
-    plans.push(plan);
+    let (mut gradient, taken) = first_order(g, RoutineKind::GaussNewton.name(), &[value], coordinates, None);
+    routes.push(taken);
     let compliant = Compliant {
         c,
         jacobian,
@@ -60,7 +61,7 @@ pub(super) fn routines(
         coordinates,
         points: program.points(),
     };
-    let mut list = potential(g, &compliant.energy, coordinates, compliant.points, plans);
+    let mut list = potential(g, &compliant.energy, coordinates, compliant.points, routes);
     list.extend(compliant.geometry(g));
     list.push(compliant.gauss_newton(g));
     list.extend(compliant.force(g));
@@ -86,13 +87,13 @@ impl Compliant<'_> {
             self.hessians.iter().flat_map(|row| self.coordinates.expand_triangle(g, row, self.points)).collect();
         [
             Whole::new(
-                "constraint_jacobian",
+                RoutineKind::ConstraintJacobian,
                 [&c[..], &jacobian].concat(),
                 vec![c.clone(), full_jacobian.clone()],
                 first,
             ),
             Whole::new(
-                "constraint_hessian",
+                RoutineKind::ConstraintHessian,
                 [&c[..], &jacobian, &hessians].concat(),
                 vec![c, full_jacobian, full_hessians],
                 second,
@@ -117,7 +118,7 @@ impl Compliant<'_> {
         let full_curvature = self.coordinates.expand_triangle(g, &curvature, self.points);
         let hazards = self.hazards(g, 1, 1);
         Whole::new(
-            "gauss_newton",
+            RoutineKind::GaussNewton,
             [&[value], &self.gradient[..], &curvature].concat(),
             vec![vec![value], full_gradient, full_curvature],
             hazards,
@@ -171,9 +172,9 @@ impl Compliant<'_> {
         let full_velocity = self.coordinates.expand_square(g, &by_velocity, self.points);
         let hazards = [(1, 1), (2, 2)].map(|(energy, rows)| self.hazards(g, energy, rows));
         [
-            Whole::new("force", force.clone(), vec![full_force.clone()], hazards[0]),
+            Whole::new(RoutineKind::Force, force.clone(), vec![full_force.clone()], hazards[0]),
             Whole::new(
-                "jacobians",
+                RoutineKind::Jacobians,
                 [force, by_position, by_velocity].concat(),
                 vec![full_force, full_position, full_velocity],
                 hazards[1],

@@ -10,18 +10,18 @@ use rustc_hash::FxHashMap;
 
 use crate::budget::{Budget, Phase};
 use crate::check::Program;
-use crate::diff::{Coordinates, Moving, Plan, SecondOrder, first_order, hessian_vector, only_dihedral, second_order};
+use crate::diff::{Coordinates, Moving, Routes, SecondOrder, first_order, hessian_vector, only_dihedral, second_order};
 use crate::graph::{Graph, Input, NodeId, Op, count, general, ordinary, with_signs_inside};
 use crate::lower::{Formula, Repetition, RestFormula};
-use energy_runtime::{Flag, Kind, OperationCount};
+use energy_runtime::{Flag, Kind, OperationCount, RoutineKind};
 use hazards::{Hazards, hazards, operations};
 use range::Tests;
 
 /// A routine to be generated.
 #[derive(Clone, Debug)]
 pub struct Routine {
-    /// Name of the routine.
-    pub name: &'static str,
+    /// Kind of the routine.
+    pub kind: RoutineKind,
     /// Results in reduced coordinates.
     pub reduced: Vec<NodeId>,
     /// Returned results by group: value, gradient, ….
@@ -50,24 +50,6 @@ pub struct General {
 }
 
 impl Routine {
-    /// Returns the number of results in each group.
-    #[must_use]
-    pub fn sizes(&self) -> Vec<usize> {
-        self.groups.iter().map(Vec::len).collect()
-    }
-
-    /// Returns whether the first group is of values, not of derivatives.
-    #[must_use]
-    pub fn has_values(&self) -> bool {
-        has_values(self.name)
-    }
-
-    /// Returns whether the first result is an energy, which is infinite outside of its domain.
-    #[must_use]
-    pub fn is_energy(&self) -> bool {
-        ["value", "gradient", "hessian", "reduced_hessian", "gauss_newton"].contains(&self.name)
-    }
-
     /// Returns all outputs.
     #[must_use]
     pub fn outputs(&self) -> Vec<NodeId> {
@@ -83,22 +65,17 @@ impl Routine {
     }
 }
 
-/// Returns whether the first group of a routine is of values, not of derivatives.
-fn has_values(routine: &str) -> bool {
-    routine != "hessian_vector"
-}
-
 /// A routine before it is split into its ordinary and its general path.
 struct Whole {
-    name: &'static str,
+    kind: RoutineKind,
     reduced: Vec<NodeId>,
     groups: Vec<Vec<NodeId>>,
     hazards: Hazards,
 }
 
 impl Whole {
-    fn new(name: &'static str, reduced: Vec<NodeId>, groups: Vec<Vec<NodeId>>, hazards: Hazards) -> Self {
-        Self { name, reduced, groups, hazards }
+    fn new(kind: RoutineKind, reduced: Vec<NodeId>, groups: Vec<Vec<NodeId>>, hazards: Hazards) -> Self {
+        Self { kind, reduced, groups, hazards }
     }
 
     fn nodes(&self) -> Vec<NodeId> {
@@ -124,13 +101,13 @@ impl Whole {
         let mut mask = |mask: Option<NodeId>| mask.map(|_| take(1)[0]);
         let flags = self.hazards.flags.map(|flag| mask(flag).filter(|&flag| g.op(flag) != Op::Truth(false)));
         let sound = mask(self.hazards.sound).filter(|&sound| g.op(sound) != Op::Truth(true));
-        Self { name: self.name, reduced, groups, hazards: Hazards { flags, sound, ..Hazards::default() } }
+        Self { kind: self.kind, reduced, groups, hazards: Hazards { flags, sound, ..Hazards::default() } }
     }
 
     /// Returns the mask where all results are finite, if the guards hold. Adds those that this takes.
     fn is_finite(&self, g: &mut Graph, guards: &mut Vec<NodeId>) -> NodeId {
         // Before results are expanded to points, they are fewer. The values come first.
-        let values = if has_values(self.name) { self.groups[0].len().min(self.reduced.len()) } else { 0 };
+        let values = if self.kind.has_values() { self.groups[0].len().min(self.reduced.len()) } else { 0 };
         let (values, derivatives) = self.reduced.split_at(values);
         let tests = Tests::of(g, guards, derivatives);
         guards.extend(tests.guards(g));
@@ -153,16 +130,16 @@ impl Whole {
         let always = outside.map(|_| g.truth(true));
         let mut guards: Vec<NodeId> = moderate.into_iter().chain(sound).chain(unflagged).chain(always).collect();
         let finite = ordinary.is_finite(g, &mut guards);
-        let Self { name, reduced, groups, .. } = ordinary;
+        let Self { kind, reduced, groups, .. } = ordinary;
         let Some(guards) = guards.into_iter().reduce(|all, guard| g.and(all, guard)) else {
             // A polynomial: it overflows where its own terms do.
             let degenerate = Some(g.not(finite)).filter(|&mask| g.op(mask) != Op::Truth(false));
-            return Routine { name, reduced, groups, flags: [degenerate, None], general: None };
+            return Routine { kind, reduced, groups, flags: [degenerate, None], general: None };
         };
         let ordinary = g.and(finite, guards);
         let Self { groups: with_care, hazards, .. } = self.with(g, &cautious);
         let general = General { ordinary, guards, groups: with_care, flags: hazards.flags, outside, definite };
-        Routine { name, reduced, groups, flags: [None, None], general: Some(general) }
+        Routine { kind, reduced, groups, flags: [None, None], general: Some(general) }
     }
 }
 
@@ -192,10 +169,16 @@ pub struct Routines {
     /// Robust primitives that the formula uses.
     pub primitives: Vec<&'static str>,
     /// Routes to the derivatives of each routine.
-    pub plans: Vec<Plan>,
+    pub routes: Vec<Routes>,
 }
 
 impl Routines {
+    /// Returns a routine; `None` if declarations of this kind do not have it.
+    #[must_use]
+    pub fn find(&self, kind: RoutineKind) -> Option<&Routine> {
+        self.list.iter().find(|routine| routine.kind == kind)
+    }
+
     /// Counts the operations that compute some outputs, in all terms of a sum.
     #[must_use]
     pub fn count(&self, outputs: &[NodeId]) -> OperationCount {
@@ -257,24 +240,24 @@ pub fn differentiate(
         Kind::Residual => Coordinates::of_unknowns(g, program.moving_size()),
         _ => Coordinates::of_points(g, &outputs, Moving::Positions),
     };
-    let mut plans = Vec::new();
+    let mut routes = Vec::new();
     let (mut expansion, mut dihedral) = (None, None);
     let list: Vec<Whole> = match program.kind {
         Kind::Energy => {
-            let (energy, plan) = second_order(g, "hessian", outputs[0], &coordinates);
-            plans.push(plan);
+            let (energy, taken) = second_order(g, RoutineKind::Hessian.name(), outputs[0], &coordinates);
+            routes.push(taken);
             expansion = Some(Expansion::new(g, &energy, &coordinates, program.points()));
             dihedral = only_dihedral(g, energy.value, &coordinates);
-            potential(g, &energy, &coordinates, program.points(), &mut plans)
+            potential(g, &energy, &coordinates, program.points(), &mut routes)
         }
         Kind::Constraint => {
-            let (list, energy) = constraint::routines(g, program, &outputs, &coordinates, &mut plans);
+            let (list, energy) = constraint::routines(g, program, &outputs, &coordinates, &mut routes);
             expansion = Some(Expansion::new(g, &energy, &coordinates, program.points()));
             dihedral = only_dihedral(g, energy.value, &coordinates);
             list
         }
-        Kind::Force => force(g, &outputs, &coordinates, program.points(), &mut plans),
-        Kind::Residual => residual(g, &outputs, &coordinates, &mut plans),
+        Kind::Force => force(g, &outputs, &coordinates, program.points(), &mut routes),
+        Kind::Residual => residual(g, &outputs, &coordinates, &mut routes),
     };
     let primitives = primitives(g, &outputs, &list);
     let list = list.into_iter().map(|whole| whole.split(g)).collect();
@@ -288,7 +271,7 @@ pub fn differentiate(
         dihedral,
         translation_invariant: coordinates.translation_invariant,
         primitives,
-        plans,
+        routes,
         graph,
         repetition,
     }
@@ -300,15 +283,15 @@ fn potential(
     energy: &SecondOrder,
     coordinates: &Coordinates,
     points: usize,
-    plans: &mut Vec<Plan>,
+    routes: &mut Vec<Routes>,
 ) -> Vec<Whole> {
     let value = energy.value;
     let known = Some(energy.gradient.clone());
-    let (mut gradient, plan) = first_order(g, "gradient", &[value], coordinates, known);
-    plans.push(plan);
+    let (mut gradient, taken) = first_order(g, RoutineKind::Gradient.name(), &[value], coordinates, known);
+    routes.push(taken);
     let gradient = gradient.remove(0);
-    let (product, plan) = hessian_vector(g, "hessian_vector", energy, coordinates);
-    plans.push(plan);
+    let (product, taken) = hessian_vector(g, RoutineKind::HessianVector.name(), energy, coordinates);
+    routes.push(taken);
     let full_product = coordinates.expand_all(g, &product, points);
     let hazards = [0, 1, 2].map(|order| hazards(g, &[(value, order)]));
     let full_gradient = coordinates.expand_all(g, &gradient, points);
@@ -317,20 +300,31 @@ fn potential(
     let reduced = [&[value], &energy.gradient[..], &energy.hessian[..]].concat();
     let reduced_groups = vec![vec![value], energy.gradient.clone(), energy.hessian.clone()];
     vec![
-        Whole::new("value", vec![value], vec![vec![value]], hazards[0]),
-        Whole::new("gradient", [&[value], &gradient[..]].concat(), vec![vec![value], full_gradient], hazards[1]),
-        Whole::new("hessian", reduced.clone(), vec![vec![value], hessian_gradient, triangle], hazards[2]),
-        Whole::new("reduced_hessian", reduced, reduced_groups, hazards[2]),
-        Whole::new("hessian_vector", product, vec![full_product], hazards[2]),
+        Whole::new(RoutineKind::Value, vec![value], vec![vec![value]], hazards[0]),
+        Whole::new(
+            RoutineKind::Gradient,
+            [&[value], &gradient[..]].concat(),
+            vec![vec![value], full_gradient],
+            hazards[1],
+        ),
+        Whole::new(RoutineKind::Hessian, reduced.clone(), vec![vec![value], hessian_gradient, triangle], hazards[2]),
+        Whole::new(RoutineKind::ReducedHessian, reduced, reduced_groups, hazards[2]),
+        Whole::new(RoutineKind::HessianVector, product, vec![full_product], hazards[2]),
     ]
 }
 
-fn force(g: &mut Graph, f: &[NodeId], coordinates: &Coordinates, points: usize, plans: &mut Vec<Plan>) -> Vec<Whole> {
-    let (by_position, plan) = first_order(g, "jacobians", f, coordinates, None);
-    plans.push(plan);
+fn force(
+    g: &mut Graph,
+    f: &[NodeId],
+    coordinates: &Coordinates,
+    points: usize,
+    routes: &mut Vec<Routes>,
+) -> Vec<Whole> {
+    let (by_position, taken) = first_order(g, RoutineKind::Jacobians.name(), f, coordinates, None);
+    routes.push(taken);
     let velocities = Coordinates::of_points(g, f, Moving::Velocities);
-    let (by_velocity, plan) = first_order(g, "jacobians, by velocity", f, &velocities, None);
-    plans.push(plan);
+    let (by_velocity, taken) = first_order(g, "jacobians, by velocity", f, &velocities, None);
+    routes.push(taken);
     let reduced = f.iter().copied().chain(by_position.iter().chain(&by_velocity).flatten().copied()).collect();
     let square = |g: &mut Graph, rows: &[Vec<NodeId>], coordinates: &Coordinates| {
         let expanded: Vec<Vec<NodeId>> = rows.iter().map(|row| coordinates.expand_all(g, row, points)).collect();
@@ -349,20 +343,25 @@ fn force(g: &mut Graph, f: &[NodeId], coordinates: &Coordinates, points: usize, 
     let order = |order: u8| f.iter().map(|&node| (node, order)).collect::<Vec<_>>();
     let hazards = [0, 1].map(|i| hazards(g, &order(i)));
     vec![
-        Whole::new("force", f.to_vec(), vec![f.to_vec()], hazards[0]),
-        Whole::new("jacobians", reduced, vec![f.to_vec(), full_position, full_velocity], hazards[1]),
+        Whole::new(RoutineKind::Force, f.to_vec(), vec![f.to_vec()], hazards[0]),
+        Whole::new(RoutineKind::Jacobians, reduced, vec![f.to_vec(), full_position, full_velocity], hazards[1]),
     ]
 }
 
-fn residual(g: &mut Graph, r: &[NodeId], coordinates: &Coordinates, plans: &mut Vec<Plan>) -> Vec<Whole> {
-    let (jacobian, plan) = first_order(g, "jacobian", r, coordinates, None);
-    plans.push(plan);
+fn residual(g: &mut Graph, r: &[NodeId], coordinates: &Coordinates, routes: &mut Vec<Routes>) -> Vec<Whole> {
+    let (jacobian, taken) = first_order(g, RoutineKind::Jacobian.name(), r, coordinates, None);
+    routes.push(taken);
     let jacobian = jacobian.concat();
     let order = |order: u8| r.iter().map(|&node| (node, order)).collect::<Vec<_>>();
     let hazards = [0, 1].map(|i| hazards(g, &order(i)));
     vec![
-        Whole::new("residual", r.to_vec(), vec![r.to_vec()], hazards[0]),
-        Whole::new("jacobian", r.iter().chain(&jacobian).copied().collect(), vec![r.to_vec(), jacobian], hazards[1]),
+        Whole::new(RoutineKind::Residual, r.to_vec(), vec![r.to_vec()], hazards[0]),
+        Whole::new(
+            RoutineKind::Jacobian,
+            r.iter().chain(&jacobian).copied().collect(),
+            vec![r.to_vec(), jacobian],
+            hazards[1],
+        ),
     ]
 }
 

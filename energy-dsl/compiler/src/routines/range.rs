@@ -295,8 +295,9 @@ impl Analysis {
             Op::RootError(_, root) => size(root),
             Op::DifferenceError(a, b) if is_moving_input(g, a) && is_moving_input(g, b) => Size::of_length(2),
             Op::DifferenceError(a, b) => size(a).plus(size(b)),
-            // Sines, angles and logarithms are small.
-            _ => Size::default(),
+            Op::Sin(_) | Op::Cos(_) | Op::Ln(_) | Op::Atan2(..) | Op::ModerateAtan2(..) => Size::default(),
+            op if op.is_mask() || matches!(op, Op::Pi | Op::PowerOfTwoScale(_)) => Size::default(),
+            _ => Size::of(UNKNOWN),
         }
     }
 

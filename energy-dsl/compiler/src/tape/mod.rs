@@ -1,234 +1,88 @@
-//! Writes statements to tapes, for declarations that are read at run time.
+//! Renders plans as tapes, for declarations that are read at run time.
 
 mod recorder;
 mod steps;
 
-use crate::check::Program;
-use crate::graph::{Graph, Input, NodeId};
-use crate::routines::{self, Routines};
-use crate::statements::Code;
-use energy_runtime::Kind;
-use energy_runtime::tape::{self, General};
+use crate::graph::Input;
+use crate::plan::{Code, GeneralPlan, Plan, RoutinePlan};
+use energy_runtime::RoutineKind;
+use energy_runtime::tape::{General, Routine, Routines};
 use recorder::{Recorded, record};
 
 pub(crate) use recorder::TooLarge;
 
-/// The statements of a routine.
-#[derive(Clone, Debug)]
-pub(crate) struct RoutineCode {
-    pub(crate) name: &'static str,
-    /// The ordinary path.
-    pub(crate) ordinary: Code,
-    /// Whether a fault was planted in the ordinary path. The guard then does not share its statements.
-    pub(crate) is_broken: bool,
-    /// The path for inputs that the ordinary path does not suffice for.
-    general: Option<GeneralCode>,
-    /// Whether the first group is of values, not of derivatives.
-    values_first: bool,
-    /// Whether the first group is an energy.
-    is_energy: bool,
-    /// Whether derivatives are added to each other when they are expanded to points.
-    is_summed: bool,
+/// Writes all routines of a plan to tapes.
+pub(crate) fn tapes(plan: &Plan) -> Result<Routines, TooLarge> {
+    let list = plan.routines.iter().map(|routine| with_leading_inputs(plan, routine)).collect::<Result<_, _>>()?;
+    let expansion = match (&plan.expansion, plan.find(RoutineKind::ReducedHessian)) {
+        (Some(expansion), Some(reduced)) => Some(expansion_tape(expansion, reduced.sizes().iter().sum())?),
+        _ => None,
+    };
+    Ok(Routines {
+        name: plan.declaration.name.clone().into_owned(),
+        coordinates: plan.coordinates,
+        parameters: plan.parameters,
+        shape: plan.shape,
+        rest: routine_tape(&plan.rest, Vec::new())?,
+        list,
+        expansion,
+        repetition: plan.repetition.clone(),
+    })
 }
 
-/// The statements of a general path.
-#[derive(Clone, Debug)]
-struct GeneralCode {
-    /// The mask where the ordinary path suffices.
-    guard: Code,
-    path: Code,
-    /// The mask of inputs outside of the domain; `None` if all inputs are inside.
-    outside: Option<Code>,
+/// Writes a routine to a tape. Positions come first, then velocities, if it reads any.
+fn with_leading_inputs(plan: &Plan, routine: &RoutinePlan) -> Result<Routine, TooLarge> {
+    let coordinates = u16::try_from(plan.coordinates).map_err(|_| TooLarge)?;
+    let velocities = if routine.reads_velocities() { coordinates } else { 0 };
+    let leading = (0..coordinates).map(Input::Position).chain((0..velocities).map(Input::Velocity));
+    routine_tape(routine, leading.collect())
 }
 
-impl GeneralCode {
-    fn new(graph: &Graph, general: &routines::General) -> Self {
-        let settled = [general.outside, general.definite];
-        Self {
-            guard: Code::guard(graph, general.ordinary),
-            path: Code::settling(graph, &general.groups, general.flags, settled),
-            outside: general.outside.map(|outside| Code::guard(graph, outside)),
-        }
-    }
-}
-
-impl RoutineCode {
-    fn new(routines: &Routines, routine: &routines::Routine) -> Self {
-        let graph = &routines.graph;
-        Self {
-            name: routine.name,
-            ordinary: Code::new(graph, &routine.groups, routine.flags),
-            is_broken: false,
-            general: routine.general.as_ref().map(|general| GeneralCode::new(graph, general)),
-            values_first: routine.has_values(),
-            is_energy: routine.is_energy(),
-            is_summed: routine.name == "reduced_hessian" && routines.vectors.len() > 1,
-        }
-    }
-
-    /// Creates the code of the `rest` block. Its first flag marks degenerate shapes.
-    fn of_rest(routines: &Routines) -> Self {
-        let rest = &routines.rest;
-        let outputs = std::slice::from_ref(&rest.outputs);
-        Self {
-            name: "rest",
-            ordinary: Code::new(&rest.graph, outputs, [routines.refused, None]),
-            is_broken: false,
-            general: None,
-            values_first: true,
-            is_energy: false,
-            is_summed: false,
-        }
-    }
-
-    /// Writes the routine to a tape. `leading` are the inputs that come first.
-    fn record(&self, leading: &[Input]) -> Result<tape::Routine, TooLarge> {
-        let guarded = self.general.as_ref().map(|general| self.ordinary.with_guard(&general.guard, !self.is_broken));
-        let code = guarded.as_ref().unwrap_or(&self.ordinary);
-        let mut inputs = leading.to_vec();
-        // The mask of the domain is one of the path's results, so that it has no other inputs.
-        let others = self.general.as_ref().map(|general| inputs_of(&general.path)).unwrap_or_default();
-        for input in inputs_of(code).into_iter().chain(others.iter().copied()) {
-            if !inputs.contains(&input) {
-                inputs.push(input);
-            }
-        }
-        let ordinary = record(code, &inputs)?;
-        let place = |input: &Input| inputs.iter().position(|other| other == input).expect("it was added");
-        let general = match &self.general {
-            None => None,
-            Some(GeneralCode { path, outside, .. }) => {
-                let Recorded { tape, groups, flags, settled, .. } = record(path, &others)?;
-                let (values, results) = (groups[0].len(), groups.concat());
-                let outside = outside.as_ref().map(|code| record(code, &others)).transpose()?;
-                let outside = outside.and_then(|Recorded { tape, guard, .. }| Some((tape, guard?)));
-                Some(General {
-                    ordinary: ordinary.guard.expect("compiler bug: a general path has a guard"),
-                    inputs: others
-                        .iter()
-                        .map(place)
-                        .map(u16::try_from)
-                        .collect::<Result<_, _>>()
-                        .map_err(|_| TooLarge)?,
-                    moves: others.iter().map(|i| matches!(i, Input::Position(_) | Input::Velocity(_))).collect(),
-                    tape,
-                    summed: if self.is_summed { values } else { results.len() },
-                    results,
-                    flags,
-                    settled,
-                    outside,
-                    values_first: self.values_first,
-                    is_energy: self.is_energy,
-                })
-            }
-        };
-        let Recorded { tape, groups, flags, .. } = ordinary;
-        Ok(tape::Routine { name: self.name, inputs, tape, groups, flags, general })
-    }
-}
-
-/// Returns the inputs that code reads, in order.
-fn inputs_of(code: &Code) -> Vec<Input> {
-    let input = |op: &crate::graph::Op| if let crate::graph::Op::Input(input) = *op { Some(input) } else { None };
-    let mut inputs = Vec::new();
-    for input in code.statements.list().iter().filter_map(input) {
+/// Writes a routine to a tape with some inputs first.
+fn routine_tape(routine: &RoutinePlan, mut inputs: Vec<Input>) -> Result<Routine, TooLarge> {
+    let RoutinePlan { kind, ordinary, is_broken, general } = routine;
+    let guarded = general.as_ref().map(|general| ordinary.with_guard(&general.guard, !is_broken));
+    let code = guarded.as_ref().unwrap_or(ordinary);
+    for input in code.inputs().into_iter().chain(general.iter().flat_map(|general| general.path.inputs())) {
         if !inputs.contains(&input) {
             inputs.push(input);
         }
     }
-    inputs
+    let Recorded { tape, groups, flags, guard, .. } = record(code, &inputs)?;
+    let general = match (general, guard) {
+        (Some(general), Some(guard)) => Some(general_tape(general, guard, &inputs)?),
+        _ => None,
+    };
+    Ok(Routine { kind: *kind, inputs, tape, groups, flags, general })
 }
 
-/// The statements of an element.
-#[derive(Clone, Debug)]
-pub(crate) struct ElementCode {
-    name: String,
-    coordinates: usize,
-    parameters: usize,
-    shape: usize,
-    pub(crate) rest: RoutineCode,
-    pub(crate) routines: Vec<RoutineCode>,
-    expansion: Option<Code>,
-    repetition: Option<tape::Repetition>,
+/// Writes a general path to a tape. `guard` is the mask slot of the ordinary tape, which has these `inputs`.
+fn general_tape(general: &GeneralPlan, guard: u16, inputs: &[Input]) -> Result<General, TooLarge> {
+    let (own, moves) = general.inputs();
+    let place = |input: &Input| inputs.iter().position(|other| other == input).expect("it was added");
+    let places = own.iter().map(place).map(u16::try_from).collect::<Result<_, _>>().map_err(|_| TooLarge)?;
+    let Recorded { tape, groups, flags, settled, .. } = record(&general.path, &own)?;
+    let outside = general.outside.as_ref().map(|code| record(code, &own)).transpose()?;
+    Ok(General {
+        ordinary: guard,
+        inputs: places,
+        moves,
+        tape,
+        results: groups.concat(),
+        flags,
+        settled,
+        outside: outside.and_then(|Recorded { tape, guard, .. }| Some((tape, guard?))),
+        summed: general.summed,
+    })
 }
 
-impl ElementCode {
-    pub(crate) fn new(program: &Program, routines: &Routines) -> Self {
-        // The full Hessian is expanded from the reduced one.
-        let has_expansion = matches!(program.kind, Kind::Energy | Kind::Constraint);
-        let wanted = |routine: &&routines::Routine| !(has_expansion && routine.name == "hessian");
-        let list = routines.list.iter().filter(wanted).map(|routine| RoutineCode::new(routines, routine));
-        let expansion = routines.expansion.as_ref().map(|expansion| {
-            Code::new(&expansion.graph, &[expansion.gradient.clone(), expansion.triangle.clone()], [None, None])
-        });
-        Self {
-            name: program.name.clone(),
-            coordinates: program.moving_size(),
-            parameters: program.parameters_size(),
-            shape: program.rest.iter().map(|input| input.input_type.size()).sum(),
-            rest: RoutineCode::of_rest(routines),
-            routines: list.collect(),
-            expansion,
-            repetition: routines.repetition.clone(),
-        }
-    }
-
-    /// Writes all routines to tapes.
-    pub(crate) fn record(&self) -> Result<tape::Routines, TooLarge> {
-        let list = self.routines.iter().map(|routine| self.record_routine(routine)).collect::<Result<_, _>>()?;
-        let reduced = self.routines.iter().find(|routine| routine.name == "reduced_hessian");
-        let expansion = match (&self.expansion, reduced) {
-            (Some(expansion), Some(reduced)) => {
-                let results = reduced.ordinary.groups.iter().map(Vec::len).sum();
-                Some(record_expansion(expansion, results)?)
-            }
-            _ => None,
-        };
-        Ok(tape::Routines {
-            name: self.name.clone(),
-            coordinates: self.coordinates,
-            parameters: self.parameters,
-            shape: self.shape,
-            rest: self.rest.record(&[])?,
-            list,
-            expansion,
-            repetition: self.repetition.clone(),
-        })
-    }
-
-    /// Writes one routine to a tape. Positions come first, then velocities, if it reads any.
-    pub(crate) fn record_routine(&self, routine: &RoutineCode) -> Result<tape::Routine, TooLarge> {
-        let coordinates = u16::try_from(self.coordinates).map_err(|_| TooLarge)?;
-        let reads = |code: &Code| inputs_of(code).iter().any(|input| matches!(input, Input::Velocity(_)));
-        let paths = std::iter::once(&routine.ordinary)
-            .chain(routine.general.iter().flat_map(|general| [&general.guard, &general.path]));
-        let velocities = if paths.into_iter().any(reads) { coordinates } else { 0 };
-        let leading = (0..coordinates).map(Input::Position).chain((0..velocities).map(Input::Velocity));
-        routine.record(&leading.collect::<Vec<_>>())
-    }
-}
-
-/// Writes the expansion to points. Its inputs are all `results` of the reduced routine, the value first.
-fn record_expansion(code: &Code, results: usize) -> Result<tape::Routine, TooLarge> {
+/// Writes the expansion to points. Its inputs are all `results` of the reduced Hessian, the value first.
+fn expansion_tape(code: &Code, results: usize) -> Result<Routine, TooLarge> {
     let results = u16::try_from(results).map_err(|_| TooLarge)?;
     // The derivatives are numbered from 0; the value gets a number that no derivative has.
     let inputs: Vec<Input> =
         std::iter::once(Input::Parameter(0)).chain((0..results - 1).map(Input::Precomputed)).collect();
     let Recorded { tape, groups, .. } = record(code, &inputs)?;
     let groups = std::iter::once(vec![0]).chain(groups).collect();
-    Ok(tape::Routine { name: "hessian", inputs, tape, groups, flags: [None, None], general: None })
-}
-
-/// Returns whether a statement's result is a number of the results, other than through a comparison.
-pub(crate) fn are_numbers_of_results(code: &Code) -> Vec<bool> {
-    let list = code.statements.list();
-    let mut reach = vec![false; list.len()];
-    let mark = |reach: &mut Vec<bool>, at: NodeId| reach[at.0 as usize] = true;
-    code.groups.iter().flatten().for_each(|&at| mark(&mut reach, at));
-    for place in (0..list.len()).rev().filter(|&place| !list[place].is_mask()) {
-        if reach[place] {
-            list[place].operands().for_each(|at| mark(&mut reach, at));
-        }
-    }
-    reach
+    Ok(Routine { kind: RoutineKind::Hessian, inputs, tape, groups, flags: [None, None], general: None })
 }

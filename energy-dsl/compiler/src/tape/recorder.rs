@@ -3,7 +3,7 @@
 use super::steps::{Step, steps};
 
 use crate::graph::{Input, NodeId, Op};
-use crate::statements::{Code, RETURNED};
+use crate::plan::{Code, RETURNED};
 use energy_runtime::tape::{Constant, Instruction, Operation, Tape};
 
 /// A routine with more numbers than a tape has slots.
@@ -145,44 +145,5 @@ pub(super) fn is_fixed(op: Op) -> bool {
 
 /// Returns the operation of a statement.
 pub(super) fn operation(op: Op) -> Operation {
-    match op {
-        Op::Neg(_) => Operation::Neg,
-        Op::Add(..) => Operation::Add,
-        Op::Sub(..) => Operation::Sub,
-        Op::Mul(..) => Operation::Mul,
-        Op::Div(..) => Operation::Div,
-        Op::Sqrt(_) => Operation::Sqrt,
-        Op::Abs(_) => Operation::Abs,
-        Op::Min(..) => Operation::Min,
-        Op::Max(..) => Operation::Max,
-        Op::Sin(_) => Operation::Sin,
-        Op::Cos(_) => Operation::Cos,
-        Op::Exp(_) => Operation::Exp,
-        Op::Ln(_) => Operation::Ln,
-        Op::Atan2(..) => Operation::Atan2,
-        Op::ModerateAtan2(..) => Operation::ModerateAtan2,
-        Op::Pow(..) => Operation::Pow,
-        Op::SumError(..) => Operation::SumError,
-        Op::DifferenceError(..) => Operation::DifferenceError,
-        Op::ProductError(..) => Operation::ProductError,
-        Op::RootError(..) => Operation::RootError,
-        Op::FusedMulSub(..) => Operation::FusedMulSub,
-        Op::MulAdd(..) => Operation::MulAdd,
-        Op::MulSub(..) => Operation::MulSub,
-        Op::NegMulAdd(..) => Operation::NegMulAdd,
-        Op::NegMulSub(..) => Operation::NegMulSub,
-        Op::PowerOfTwoScale(_) => Operation::PowerOfTwoScale,
-        Op::Less(..) => Operation::Less,
-        Op::Precedes(..) => Operation::Precedes,
-        Op::LessOrEqual(..) => Operation::LessOrEqual,
-        Op::Equal(..) => Operation::Equal,
-        Op::IsModerate(..) => Operation::IsModerate,
-        Op::And(..) => Operation::And,
-        Op::Or(..) => Operation::Or,
-        Op::Not(_) => Operation::Not,
-        Op::Select(..) => Operation::Select,
-        Op::Input(_) | Op::Constant(_) | Op::Pi | Op::Truth(_) | Op::Rule(_) | Op::Cautious => {
-            unreachable!("compiler bug: inputs and constants have slots, rules are resolved and caution is decided")
-        }
-    }
+    op.on_tape().expect("compiler bug: inputs and constants have slots, rules are resolved and caution is decided")
 }

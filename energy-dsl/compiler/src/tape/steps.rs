@@ -3,7 +3,7 @@
 
 use super::recorder::{is_fixed, operation};
 use crate::graph::{NodeId, Op};
-use crate::statements::Code;
+use crate::plan::Code;
 use energy_runtime::tape::Operation;
 
 /// One instruction to be.

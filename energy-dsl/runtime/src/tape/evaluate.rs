@@ -8,6 +8,7 @@ use super::packed::TapeElements;
 use super::routine::Routine;
 use super::runner::{Places, Runner};
 use super::slots::{Results, Slots};
+use crate::RoutineKind;
 use crate::batch::{BatchError, Flagged};
 use crate::numbers::{Flags, Float, Kernel, Lane, Level, Number, dispatch};
 
@@ -40,16 +41,18 @@ impl<S: Float> TapeElements<S> {
     /// [`TAPE_BLOCK`]. [`Places::Rows`] start with the first range.
     ///
     /// # Panics
-    /// When the routine has another name, or a range or a slice does not fit.
+    /// When the element has no such routine, or a range or a slice does not fit.
     pub fn for_each_block(
         &self,
-        routine: &str,
+        routine: RoutineKind,
         ranges: &[Range<usize>],
         places: Places<'_, S>,
         velocities: Option<Places<'_, S>>,
         work: &mut impl FnMut(BlockResults<'_, S>),
     ) {
-        let routine = self.routines.find(routine).unwrap_or_else(|| panic!("{}: no {routine}", self.routines.name));
+        let Some(routine) = self.routines.find(routine) else {
+            panic!("{}: no {}", self.routines.name, routine.name())
+        };
         let mut runner = Runner::new(self, routine);
         let rows = ranges.first().map_or(0, |range| range.start);
         for range in ranges {
@@ -62,8 +65,7 @@ impl<S: Float> TapeElements<S> {
         runner.finish();
     }
 
-    /// Writes the results of a routine (`value`, `gradient`, `jacobians`, …) for a range of elements that starts at a
-    /// multiple of [`TAPE_BLOCK`]. The routine `hessian` returns U, ∂U/∂x and the triangle of ∂²U/∂x².
+    /// Writes the results of a routine for a range of elements that starts at a multiple of [`TAPE_BLOCK`].
     ///
     /// Outputs belong to the range alone, and so do [`Places::Rows`].
     ///
@@ -74,15 +76,15 @@ impl<S: Float> TapeElements<S> {
     /// When the element has no such routine, or a layout names a result that does not exist.
     pub fn evaluate(
         &self,
-        routine: &str,
+        routine: RoutineKind,
         range: Range<usize>,
         places: Places<'_, S>,
         velocities: Option<Places<'_, S>>,
         outputs: &mut [Output<'_, S>],
     ) -> Result<Flagged, BatchError> {
         self.check(&range, [Some(places), velocities].into_iter().flatten(), outputs)?;
-        let mut expander = if routine == "hessian" { Expander::new(self) } else { None };
-        let routine = if expander.is_some() { "reduced_hessian" } else { routine };
+        let (routine, expansion) = self.routines.expanded(routine);
+        let mut expander = expansion.and_then(|_| Expander::new(self));
         let mut flagged = Vec::new();
         self.for_each_block(routine, slice::from_ref(&range), places, velocities, &mut |block| {
             let BlockResults { first, count, results, flags } = block;
@@ -109,16 +111,15 @@ impl<S: Float> TapeElements<S> {
     #[must_use]
     pub fn one(
         &self,
-        routine: &str,
+        routine: RoutineKind,
         places: Places<'_, S>,
         velocities: Option<Places<'_, S>>,
     ) -> (Vec<Vec<S>>, [bool; 2]) {
-        let mut expander = if routine == "hessian" { Expander::new(self) } else { None };
-        let name = if expander.is_some() { "reduced_hessian" } else { routine };
-        let last = expander.as_ref().map(|expander| expander.routine).or_else(|| self.routines.find(name));
-        let sizes = last.map(Routine::sizes).unwrap_or_default();
+        let (routine, expansion) = self.routines.expanded(routine);
+        let mut expander = expansion.and_then(|_| Expander::new(self));
+        let sizes = expansion.or_else(|| self.routines.find(routine)).map(Routine::sizes).unwrap_or_default();
         let (mut groups, mut flagged) = (Vec::with_capacity(sizes.len()), [false; 2]);
-        self.for_each_block(name, slice::from_ref(&(0..1)), places, velocities, &mut |block| {
+        self.for_each_block(routine, slice::from_ref(&(0..1)), places, velocities, &mut |block| {
             let BlockResults { results, flags, .. } = block;
             let results = match &mut expander {
                 Some(expander) => expander.expand(1, results),
@@ -188,7 +189,7 @@ impl<'a, S: Float> Expander<'a, S> {
         self.elements.spare.put_expansion(self.slots);
     }
 
-    /// Returns U, ∂U/∂x and the triangle of ∂²U/∂x² for the results of the routine `reduced_hessian`.
+    /// Returns U, ∂U/∂x and the triangle of ∂²U/∂x² for the results of the reduced Hessian.
     pub fn expand(&mut self, count: usize, reduced: Results<'_, S>) -> Results<'_, S> {
         for (slot, number) in self.slots.numbers_mut().iter_mut().zip(0..reduced.len()) {
             *slot = *reduced.number(number);

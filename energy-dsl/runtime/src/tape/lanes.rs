@@ -2,8 +2,9 @@
 
 use super::TAPE_BLOCK;
 use super::instruction::{Instruction, Tape};
-use super::operation::{Operation, with_operations};
+use super::operation::Operation;
 use crate::numbers::{Float, Kernel, Lane, Level, Mask, Number};
+use crate::with_operations;
 
 /// The number of one slot for each element of a block.
 pub type Slot<S> = [S; TAPE_BLOCK];
@@ -45,7 +46,17 @@ macro_rules! bits {
 }
 
 macro_rules! define_run {
-    ($($(#[$docs:meta])* $name:ident($($operand:ident),*) = $meaning:expr;)*) => {
+    (
+        numbers {
+            $($_section:ident {
+                $($(#[$_docs:meta])* $name:ident($($operand:ident),*) = $meaning:expr $(, $_cost:tt)?;)*
+            })*
+        }
+        masks {
+            comparisons { $($(#[$_less:meta])* $comparison:ident($($number:ident),*) = $outcome:expr;)* }
+            connectives { $($(#[$_and:meta])* $connective:ident($($mask:ident),*) = $connected:expr;)* }
+        }
+    ) => {
         /// Runs instructions on the first lanes of all slots, `ELEMENTS` rounded up.
         #[inline(always)]
         fn run<S: Float, L: Level, const ELEMENTS: usize>(
@@ -59,7 +70,7 @@ macro_rules! define_run {
                 let operands = instruction.operands;
                 let [i, j, k] = [usize::from(operands[0]), usize::from(operands[1]), usize::from(operands[2])];
                 match instruction.operation {
-                    $(Operation::$name => {
+                    $($(Operation::$name => {
                         let [$($operand,)* ..] = operands;
                         $(let $operand = usize::from($operand);)*
                         $(assert!($operand < slots.len());)*
@@ -70,26 +81,23 @@ macro_rules! define_run {
                             ($meaning).store(&mut slots[target][at..]);
                             at += lanes;
                         }
+                    })*)*
+                    $(Operation::$comparison => {
+                        let [$($number,)* ..] = operands;
+                        masks[target] = bits!(|at| {
+                            $(let $number = load::<S, L>(slots, usize::from($number), at);)*
+                            $outcome
+                        }, ELEMENTS, lanes);
                     })*
-                    Operation::Less | Operation::Precedes => {
-                        masks[target] = bits!(|at| load::<S, L>(slots, i, at).less(load::<S, L>(slots, j, at)),
-                            ELEMENTS, lanes);
-                    }
-                    Operation::LessOrEqual => {
-                        masks[target] = bits!(
-                            |at| load::<S, L>(slots, i, at).less_or_equal(load::<S, L>(slots, j, at)), ELEMENTS, lanes);
-                    }
-                    Operation::Equal => {
-                        masks[target] = bits!(|at| load::<S, L>(slots, i, at).equal(load::<S, L>(slots, j, at)),
-                            ELEMENTS, lanes);
-                    }
+                    $(Operation::$connective => {
+                        let [$($mask,)* ..] = operands;
+                        $(let $mask = masks[usize::from($mask)];)*
+                        masks[target] = $connected;
+                    })*
                     Operation::IsModerate => {
                         let degree = operands[1].to_le_bytes()[0];
                         masks[target] = bits!(|at| load::<S, L>(slots, i, at).is_moderate(degree), ELEMENTS, lanes);
                     }
-                    Operation::And => masks[target] = masks[i] & masks[j],
-                    Operation::Or => masks[target] = masks[i] | masks[j],
-                    Operation::Not => masks[target] = !masks[i],
                     Operation::Select => {
                         let bits = masks[i];
                         let mut at = 0;

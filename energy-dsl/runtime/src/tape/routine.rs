@@ -2,6 +2,7 @@
 
 use super::instruction::Tape;
 use super::scalar::Values;
+use crate::RoutineKind;
 use crate::numbers::{Baseline, Care, Flags, Fused, Level, Mask, Number, Ray, Roles, doubles, fill_outside, settle};
 
 /// The source of an input number.
@@ -61,8 +62,8 @@ pub enum TermNumber {
 /// A routine as tapes.
 #[derive(Clone, Debug)]
 pub struct Routine {
-    /// Name of the routine.
-    pub name: &'static str,
+    /// Kind of the routine.
+    pub kind: RoutineKind,
     /// The inputs, in the order of the first slots.
     pub inputs: Vec<Input>,
     /// The ordinary path.
@@ -94,10 +95,6 @@ pub struct General {
     pub settled: [Option<u16>; 2],
     /// A tape over the same inputs with a mask slot: the inputs outside of the domain; `None` if all inputs are inside.
     pub outside: Option<(Tape, u16)>,
-    /// Whether the first group is of values, not of derivatives.
-    pub values_first: bool,
-    /// Whether the first group is an energy.
-    pub is_energy: bool,
     /// Index from which results are added to each other later.
     pub summed: usize,
 }
@@ -116,7 +113,7 @@ impl Routine {
         let values = self.tape.run::<T, L>(inputs.iter().cloned());
         match &self.general {
             Some(general) if !values.mask(Some(general.ordinary)).all() => {
-                general.run(&self.sizes(), |input| inputs[usize::from(input)].clone())
+                general.run(self.kind, &self.sizes(), |input| inputs[usize::from(input)].clone())
             }
             _ => {
                 let results = self.groups.iter().flatten().map(|&slot| values.number(slot)).collect();
@@ -127,12 +124,17 @@ impl Routine {
 }
 
 impl General {
-    /// Runs the path. `input` returns a number by its index among the inputs of the routine, which has groups of these
-    /// `sizes`.
+    /// Runs the path. `input` returns a number by its index among the inputs of the routine, which is of some kind and
+    /// has groups of these `sizes`.
     #[cold]
-    pub(super) fn run<T: Number>(&self, sizes: &[usize], input: impl Fn(u16) -> T) -> (Vec<T>, Flags<T>) {
+    pub(super) fn run<T: Number>(
+        &self,
+        kind: RoutineKind,
+        sizes: &[usize],
+        input: impl Fn(u16) -> T,
+    ) -> (Vec<T>, Flags<T>) {
         let inputs: Vec<T::Unbounded> = self.inputs.iter().map(|&number| input(number).unbounded(0)).collect();
-        let (values_first, is_energy) = (self.values_first, self.is_energy);
+        let (values_first, is_energy) = (kind.has_values(), kind.is_energy());
         let roles = Roles { moves: &self.moves, groups: sizes, values_first, is_energy };
         let (results, flags) = self.settled(&inputs, roles);
         let bounded = |(number, value): (usize, T::Unbounded)| {
@@ -194,16 +196,31 @@ pub struct Routines {
     pub rest: Routine,
     /// The moving part, or one term of it.
     pub list: Vec<Routine>,
-    /// Expands the results of the routine `reduced_hessian`, its inputs, to U, ∂U/∂x and the triangle of ∂²U/∂x².
+    /// Expands the results of the reduced Hessian, its inputs, to U, ∂U/∂x and the triangle of ∂²U/∂x².
     pub expansion: Option<Routine>,
     /// The numbers of each term, if the routines compute one term of a sum.
     pub repetition: Option<Repetition>,
 }
 
 impl Routines {
-    /// Returns a routine by its name.
+    /// Returns a routine.
     #[must_use]
-    pub fn find(&self, name: &str) -> Option<&Routine> {
-        self.list.iter().find(|routine| routine.name == name)
+    pub fn find(&self, kind: RoutineKind) -> Option<&Routine> {
+        self.list.iter().find(|routine| routine.kind == kind)
+    }
+
+    /// Returns whether a routine can be evaluated: the full Hessian of an energy is expanded from the reduced one.
+    #[must_use]
+    pub fn has(&self, kind: RoutineKind) -> bool {
+        self.find(kind).is_some() || kind == RoutineKind::Hessian && self.expansion.is_some()
+    }
+
+    /// Returns the routine to run, and the expansion of its results, if they need any.
+    #[must_use]
+    pub fn expanded(&self, kind: RoutineKind) -> (RoutineKind, Option<&Routine>) {
+        match &self.expansion {
+            Some(expansion) if kind == RoutineKind::Hessian => (RoutineKind::ReducedHessian, Some(expansion)),
+            _ => (kind, None),
+        }
     }
 }

@@ -7,6 +7,7 @@ use super::lanes::Slot;
 use super::packed::TapeElements;
 use super::routine::{Input, Routine, TermNumber};
 use super::slots::{Results, Slots};
+use crate::RoutineKind;
 use crate::numbers::{Float, Kernel, Lane, Level, dispatch};
 
 /// Places of the points (or unknowns) of elements, or of the velocities of these points.
@@ -96,7 +97,7 @@ pub(super) struct Runner<'a, S> {
 /// The slots of a routine, ready for blocks of the elements that they belong to.
 #[derive(Debug)]
 struct State<S> {
-    name: &'static str,
+    routine: RoutineKind,
     slots: Slots<S>,
     /// Slots and numbers of the inputs that differ between elements, but not between terms.
     stored: Vec<(usize, usize)>,
@@ -128,9 +129,9 @@ impl<S> Clone for Spare<S> {
 }
 
 impl<S> Spare<S> {
-    fn take(&self, name: &str) -> Option<State<S>> {
+    fn take(&self, routine: RoutineKind) -> Option<State<S>> {
         let mut states = lock(&self.states);
-        states.iter().position(|state| state.name == name).map(|found| states.swap_remove(found))
+        states.iter().position(|state| state.routine == routine).map(|found| states.swap_remove(found))
     }
 
     pub(super) fn take_expansion(&self) -> Option<Slots<S>> {
@@ -168,13 +169,13 @@ impl<S: Float> State<S> {
             }
         }
         let sum = repetition.map(|_| Sum::new(routine));
-        Self { name: routine.name, slots, stored, of_term, sum }
+        Self { routine: routine.kind, slots, stored, of_term, sum }
     }
 }
 
 impl<'a, S: Float> Runner<'a, S> {
     pub(super) fn new(elements: &'a TapeElements<S>, routine: &'a Routine) -> Self {
-        let state = elements.spare.take(routine.name).unwrap_or_else(|| State::new(elements, routine));
+        let state = elements.spare.take(routine.kind).unwrap_or_else(|| State::new(elements, routine));
         Self { elements, routine, state }
     }
 
@@ -266,7 +267,7 @@ impl<S: Float> Sum<S> {
 
     /// Flags elements whose sum overflows, in the order of summation of generated code.
     fn note_overflow(&mut self, routine: &Routine, count: usize) {
-        let is_reduced = routine.name == "reduced_hessian";
+        let is_reduced = routine.kind == RoutineKind::ReducedHessian;
         for element in 0..count {
             let (mut sum, mut first) = (S::from_f64(0.0), 0);
             for size in routine.sizes() {

@@ -1,8 +1,9 @@
 //! Runs tapes over one element of any number type.
 
 use super::instruction::{Constant, Instruction, Tape};
-use super::operation::{Operation, with_operations};
+use super::operation::Operation;
 use crate::numbers::{Level, Mask, Number};
+use crate::with_operations;
 
 /// The results of a tape over one element.
 #[derive(Debug)]
@@ -67,7 +68,17 @@ impl Tape {
 }
 
 macro_rules! define_step {
-    ($($(#[$docs:meta])* $name:ident($($operand:ident),*) = $meaning:expr;)*) => {
+    (
+        numbers {
+            $($_section:ident {
+                $($(#[$_docs:meta])* $name:ident($($operand:ident),*) = $meaning:expr $(, $_cost:tt)?;)*
+            })*
+        }
+        masks {
+            comparisons { $($(#[$_less:meta])* $comparison:ident($($number:ident),*) = $outcome:expr;)* }
+            connectives { $($(#[$_and:meta])* $connective:ident($($mask:ident),*) = $connected:expr;)* }
+        }
+    ) => {
         fn step<T: Number, L: Level>(
             instruction: &Instruction,
             values: &mut Values<T>,
@@ -77,20 +88,23 @@ macro_rules! define_step {
             let [first, second, third, ..] = operands;
             let mask = |slot: u16| values.masks[usize::from(slot)];
             let mask = match instruction.operation {
-                $(Operation::$name => {
+                $($(Operation::$name => {
                     let [$($operand,)* ..] = operands;
                     $(let $operand = values.number($operand);)*
                     values.numbers[usize::from(instruction.target)] = $meaning;
                     return;
+                })*)*
+                $(Operation::$comparison => {
+                    let [$($number,)* ..] = operands;
+                    $(let $number = values.number($number);)*
+                    $outcome
                 })*
-                Operation::Less => values.number(first).less(values.number(second)),
-                Operation::Precedes => values.number(first).precedes(values.number(second)),
-                Operation::LessOrEqual => values.number(first).less_or_equal(values.number(second)),
-                Operation::Equal => values.number(first).equal(values.number(second)),
+                $(Operation::$connective => {
+                    let [$($mask,)* ..] = operands;
+                    $(let $mask = mask($mask);)*
+                    $connected
+                })*
                 Operation::IsModerate => values.number(first).is_moderate(second.to_le_bytes()[0]),
-                Operation::And => mask(first) & mask(second),
-                Operation::Or => mask(first) | mask(second),
-                Operation::Not => !mask(first),
                 Operation::Select => {
                     let chosen = T::select(mask(first), values.number(second), values.number(third));
                     values.numbers[usize::from(instruction.target)] = chosen;

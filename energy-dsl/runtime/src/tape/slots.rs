@@ -69,7 +69,7 @@ impl<S: Float> Slots<S> {
         let (sizes, numbers) = (routine.sizes(), self.numbers.as_chunks::<TAPE_BLOCK>().0);
         let mut replaced: Vec<Slot<S>> = self.results.iter().map(|&slot| numbers[usize::from(slot)]).collect();
         for element in (0..TAPE_BLOCK).filter(|element| extraordinary >> element & 1 == 1) {
-            let (results, flags) = general.run(&sizes, |input| numbers[usize::from(input)][element]);
+            let (results, flags) = general.run(routine.kind, &sizes, |input| numbers[usize::from(input)][element]);
             replaced.iter_mut().zip(results).for_each(|(slot, result)| slot[element] = result);
             self.flags[0] |= u64::from(flags.degenerate.any()) << element;
             self.flags[1] |= u64::from(flags.kink.any()) << element;

@@ -4,7 +4,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use energy_dsl::tape::{BlockResults, Expander, Places, Results, Slot, TAPE_BLOCK, TapeElements, stencil_blocks};
-use energy_dsl::{Declaration, Kernel, Lane, Level, Vector3, dispatch};
+use energy_dsl::{Declaration, Kernel, Lane, Level, RoutineKind, Vector3, dispatch};
 
 use super::evaluated::Evaluated;
 use super::work::{Expanded, Gradients, Hessians, Values};
@@ -31,7 +31,8 @@ impl TapePacks {
         vertex: impl Fn(usize, usize) -> u32,
     ) -> Self {
         let stencils = stencil_blocks(elements.len(), declaration.points.len(), vertex);
-        let reduced = elements.routines().find("reduced_hessian").map_or(0, |r| r.groups.iter().map(Vec::len).sum());
+        let reduced =
+            elements.routines().find(RoutineKind::ReducedHessian).map_or(0, |r| r.groups.iter().map(Vec::len).sum());
         Self { declaration, elements, stencils, identity: (0..=u16::MAX).take(reduced).collect() }
     }
 
@@ -50,7 +51,7 @@ impl TapePacks {
     /// Calls `work` with the results of a routine and the vertices of each block.
     fn for_each_block(
         &self,
-        routine: &str,
+        routine: RoutineKind,
         packs: &[Range<usize>],
         x: &[Vector3<f64>],
         work: &mut impl FnMut(BlockResults<'_, f64>, &[u32]),
@@ -85,13 +86,13 @@ impl Evaluated for TapePacks {
     }
 
     fn values(&self, packs: &[Range<usize>], x: &[Vector3<f64>], work: &mut Values<'_>) {
-        self.for_each_block("value", packs, x, &mut |block, stencils| {
+        self.for_each_block(RoutineKind::Value, packs, x, &mut |block, stencils| {
             dispatch(AddValues { block, stencils, work: &mut *work });
         });
     }
 
     fn gradients(&self, packs: &[Range<usize>], x: &[Vector3<f64>], work: &mut Gradients<'_>) {
-        self.for_each_block("gradient", packs, x, &mut |block, stencils| {
+        self.for_each_block(RoutineKind::Gradient, packs, x, &mut |block, stencils| {
             dispatch(AddGradients { block, stencils, work: &mut *work });
         });
     }
@@ -99,7 +100,7 @@ impl Evaluated for TapePacks {
     fn hessians(&self, packs: &[Range<usize>], x: &[Vector3<f64>], work: &mut Hessians<'_, '_>) {
         let mut expander = Expander::new(&self.elements).expect("an energy has an expansion");
         let mut reduced: Vec<Slot<f64>> = vec![[0.0; TAPE_BLOCK]; self.identity.len()];
-        self.for_each_block("reduced_hessian", packs, x, &mut |block, stencils| {
+        self.for_each_block(RoutineKind::ReducedHessian, packs, x, &mut |block, stencils| {
             let BlockResults { first, count, results, flags } = block;
             let mut projected = [0; TAPE_BLOCK];
             let results = if work.is_projected() {
@@ -122,7 +123,7 @@ impl Evaluated for TapePacks {
 
     fn each_gradient(&self, x: &[Vector3<f64>], each: &mut dyn FnMut(usize, f64, &[f64])) {
         let all = 0..self.elements.len();
-        self.for_each_block("gradient", std::slice::from_ref(&all), x, &mut |block, _| {
+        self.for_each_block(RoutineKind::Gradient, std::slice::from_ref(&all), x, &mut |block, _| {
             for element in 0..block.count {
                 let number = |result: usize| block.results.number(result)[element];
                 let gradient: Vec<f64> = (1..block.results.len()).map(number).collect();

@@ -94,7 +94,7 @@ impl<'a> Inference<'a> {
                     span: &typed.span,
                     constant: arguments.last().and_then(|last| evaluate(&self.program.bindings, last)),
                 };
-                rules::apply(self, &call)
+                rules::apply(self, &call, function.units)
             }
             TypedKind::Select(condition, yes, no) => {
                 self.expression(condition);

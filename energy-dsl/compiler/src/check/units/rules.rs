@@ -4,7 +4,7 @@ use super::dimension::Dimension;
 use super::infer::{Inference, Units};
 use crate::check::typed::Typed;
 use crate::diagnostic::Span;
-use crate::functions::Shape;
+use crate::functions::{Shape, Units as Rule};
 
 /// A function with its arguments.
 pub(super) struct Call<'a> {
@@ -28,52 +28,54 @@ impl Call<'_> {
 }
 
 /// Returns the units of the result.
-pub(super) fn apply(inference: &mut Inference<'_>, call: &Call<'_>) -> Units {
+pub(super) fn apply(inference: &mut Inference<'_>, call: &Call<'_>, rule: Rule) -> Units {
     let number = || Units::one(Dimension::default());
     let all: Vec<&Units> = call.units.iter().collect();
-    let size = match call.arguments[0].shape {
-        Shape::Matrix(n, _) => f64::from(n),
-        _ => 1.0,
-    };
-    match call.name {
-        "+" | "-" | "min" | "max" | "clamp" | "columns" | "vector" => inference.same(call.name, &all, call.span),
-        "<" | "<=" | ">" | ">=" | "==" | "!=" => {
+    match rule {
+        Rule::Plain => {
+            call.units.iter().for_each(|units| _ = inference.number(call.name, &units.main(), call.span));
+            number()
+        }
+        Rule::Number => number(),
+        Rule::Same => inference.same(call.name, &all, call.span),
+        Rule::Compared => {
             inference.same(call.name, &all, call.span);
             number()
         }
-        "neg" | "abs" | "transpose" | "trace" | "conjugate" | "stretch_of" => call.units[0].clone(),
-        "*" => product(inference, call),
-        "dot" | "cross" | "outer" | "ddot" => scaled(call),
-        "/" => call.units[0].map(|d| d.over(&call.main(1))),
-        "^" => power(inference, call),
-        "sqrt" => call.units[0].map(|d| d.power(0.5)),
-        "norm_squared" => call.units[0].map(|d| d.power(2.0)),
-        "det" => call.units[0].map(|d| d.power(size)),
-        "adjugate" => call.units[0].map(|d| d.power(size - 1.0)),
-        "inverse" | "power_of_two" | "scaled_adjugate" => call.units[0].map(|d| d.power(-1.0)),
-        "huber" | "pseudo_huber" => inference.same(call.name, &all, call.span).map(|d| d.power(2.0)),
-        "norm" => call.units[0].clone(),
-        "unit" if call.is(0, Shape::DualQuat) => {
+        Rule::SquareOfSame => inference.same(call.name, &all, call.span).map(|d| d.power(2.0)),
+        Rule::First => call.units[0].clone(),
+        Rule::Power(exponent) => call.units[0].map(|d| d.power(exponent)),
+        Rule::PowerOfSize(more) => {
+            let size = if let Shape::Matrix(n, _) = call.arguments[0].shape { f64::from(n) } else { 1.0 };
+            call.units[0].map(|d| d.power(size + f64::from(more)))
+        }
+        Rule::Scaled => scaled(call),
+        Rule::Product => product(inference, call),
+        Rule::Quotient => call.units[0].map(|d| d.over(&call.main(1))),
+        Rule::Raised => power(inference, call),
+        Rule::Direction if call.is(0, Shape::DualQuat) => {
             Units::two(Dimension::default(), call.units[0].other().over(&call.main(0)))
         }
-        "atan2" | "dihedral" => {
-            inference.same(call.name, &all, call.span);
-            number()
+        Rule::Direction => number(),
+        Rule::Exponential => {
+            inference.number(call.name, &call.main(0), call.span);
+            if call.is(0, Shape::Twist) { call.units[0].clone() } else { number() }
         }
-        "unit" | "angle" | "sign" | "identity" | "rotation_of" | "scaled_det" => number(),
-        "[]" => component(call),
-        "exp" if call.is(0, Shape::Twist) => {
-            inference.number("exp", &call.main(0), call.span);
-            call.units[0].clone()
+        Rule::Component => component(call),
+        Rule::Parts => Units::two(call.main(0), call.main(1)),
+        Rule::FirstPart => Units::one(call.main(0)),
+        Rule::SecondPart => Units::one(call.units[0].other()),
+        Rule::Rotated => {
+            inference.number(call.name, &call.main(0), call.span);
+            call.units[1].clone()
         }
-        "quat" | "dual_quat" | "twist" | "angular" | "linear" | "real" | "dual" | "imaginary" | "rotate"
-        | "transform" | "rotation" | "rotation_matrix" => of_motion(inference, call),
-        "&&" | "||" => number(),
-        // All other functions take plain numbers.
-        _ => {
-            for units in call.units {
-                inference.number(call.name, &units.main(), call.span);
-            }
+        Rule::Transformed => {
+            inference.number(call.name, &call.main(0), call.span);
+            let dual = Units::one(call.units[0].other());
+            inference.same(call.name, &[&dual, &call.units[1]], call.span)
+        }
+        Rule::Orientation => {
+            inference.number(call.name, &call.main(0), call.span);
             number()
         }
     }
@@ -112,28 +114,4 @@ fn component(call: &Call<'_>) -> Units {
     let half = call.arguments[0].shape.size() / 2;
     let second = call.constant.is_some_and(|index| index >= half as f64);
     Units::one(if second { call.units[0].other() } else { call.main(0) })
-}
-
-fn of_motion(inference: &mut Inference<'_>, call: &Call<'_>) -> Units {
-    let all: Vec<&Units> = call.units.iter().collect();
-    match call.name {
-        "quat" => inference.same("quat", &all, call.span),
-        "dual_quat" | "twist" => Units::two(call.main(0), call.main(1)),
-        "dual" | "linear" => Units::one(call.units[0].other()),
-        "rotate" => {
-            inference.number("rotate", &call.main(0), call.span);
-            call.units[1].clone()
-        }
-        "transform" => {
-            inference.number("transform", &call.main(0), call.span);
-            let dual = Units::one(call.units[0].other());
-            inference.same("transform", &[&dual, &call.units[1]], call.span)
-        }
-        "rotation" | "rotation_matrix" => {
-            inference.number(call.name, &call.main(0), call.span);
-            Units::one(Dimension::default())
-        }
-        // `real`, `angular` and `imaginary` return the first part.
-        _ => Units::one(call.main(0)),
-    }
 }

@@ -1,20 +1,21 @@
-//! The self-description of an element that is read at run time.
+//! The self-description of an element.
 
 use std::borrow::Cow;
 
 use crate::check::{Input, Program};
-use crate::emit::{Character, character};
+use crate::graph::NodeId;
 use crate::routines::Routines;
-use energy_runtime::{Declaration, Field, Kind, Routine};
+use energy_runtime::{Declaration, Field, Kind, Routine, RoutineKind};
 
-/// Returns the self-description that generated code would have. It owns its texts and lists.
+/// Returns the self-description of an element. It owns its texts and lists.
 pub(super) fn description(program: &Program, routines: &Routines) -> Declaration {
+    // The stiffness and damping of a constraint are implied by its kind.
     let implied = if program.kind == Kind::Constraint { 2 } else { 0 };
     let declared = &program.parameters[..program.parameters.len() - implied];
     let docs: Vec<&str> = program.docs.iter().map(|line| line.strip_prefix(' ').unwrap_or(line)).collect();
     let Character { curved, quadratic, velocity_dependent, symmetric } = character(program, routines);
     let list = routines.list.iter().map(|routine| Routine {
-        name: routine.name,
+        name: routine.kind.name(),
         reduced: routines.count(&routine.reduced_outputs()),
         full: routines.count(&routine.outputs()),
     });
@@ -49,4 +50,33 @@ fn fields(inputs: &[Input]) -> Cow<'static, [Field]> {
         unit: Cow::Owned(input.unit.clone()),
     };
     inputs.iter().map(field).collect()
+}
+
+/// Properties that solvers rely on.
+struct Character {
+    curved: bool,
+    quadratic: bool,
+    velocity_dependent: bool,
+    symmetric: bool,
+}
+
+fn character(program: &Program, routines: &Routines) -> Character {
+    let group = |kind: RoutineKind, number: usize| routines.find(kind)?.groups.get(number);
+    let varies = |nodes: Option<&Vec<NodeId>>| nodes.is_some_and(|n| n.iter().any(|&e| !routines.graph.is(e, 0.0)));
+    let (by_position, by_velocity) = (group(RoutineKind::Jacobians, 1), group(RoutineKind::Jacobians, 2));
+    let n = program.points();
+    let mirrored = |square: &Vec<NodeId>| {
+        let entry = |row: usize, column: usize| square[9 * (row / 3 * n + column / 3) + 3 * (row % 3) + column % 3];
+        (0..3 * n).all(|row| (0..row).all(|column| entry(row, column) == entry(column, row)))
+    };
+    let constant = |nodes: &Vec<NodeId>| nodes.iter().all(|&entry| !routines.graph.varies(entry));
+    Character {
+        quadratic: match (by_position, by_velocity) {
+            (None, None) => group(RoutineKind::Hessian, 2).is_some_and(constant),
+            jacobians => [jacobians.0, jacobians.1].into_iter().flatten().all(constant),
+        },
+        curved: varies(group(RoutineKind::Hessian, 2).or(by_position)),
+        velocity_dependent: varies(by_velocity),
+        symmetric: [by_position, by_velocity].into_iter().flatten().all(mirrored),
+    }
 }

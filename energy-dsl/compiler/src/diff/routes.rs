@@ -32,11 +32,11 @@ pub struct Route {
 
 /// The routes to the derivatives of a routine. The first one was chosen.
 #[derive(Clone, Debug)]
-pub struct Plan {
+pub struct Routes {
     /// Name of the routine.
     pub routine: &'static str,
     /// Routes by increasing cost.
-    pub routes: Vec<Route>,
+    pub list: Vec<Route>,
 }
 
 /// A candidate route.
@@ -55,7 +55,7 @@ fn choose(
     routine: &'static str,
     values: &[NodeId],
     alternatives: &[Alternative],
-) -> (Vec<NodeId>, Plan) {
+) -> (Vec<NodeId>, Routes) {
     let mut order: Vec<(usize, Route)> = Vec::with_capacity(alternatives.len());
     for (number, alternative) in alternatives.iter().enumerate() {
         let nodes = [values, &alternative.nodes].concat();
@@ -72,7 +72,7 @@ fn choose(
     let safe = order.iter().map(|(number, _)| &alternatives[*number]).find(|a| a.safe).expect("one route is safe");
     let cautious = g.cautious();
     let nodes = best.nodes.iter().zip(&safe.nodes).map(|(&best, &safe)| g.select(cautious, safe, best)).collect();
-    (nodes, Plan { routine, routes: order.into_iter().map(|(_, route)| route).collect() })
+    (nodes, Routes { routine, list: order.into_iter().map(|(_, route)| route).collect() })
 }
 
 /// Returns the first and second derivatives of a scalar by the cheapest route.
@@ -81,7 +81,7 @@ pub fn second_order(
     routine: &'static str,
     value: NodeId,
     coordinates: &Coordinates,
-) -> (SecondOrder, Plan) {
+) -> (SecondOrder, Routes) {
     let n = coordinates.len();
     let zero = g.constant(0.0);
     let dense = |entries: BTreeMap<usize, NodeId>| {
@@ -122,9 +122,9 @@ pub fn second_order(
             offer(name, &found.gradient, &dense(found.hessian), found.safe);
         }
     }
-    let (mut gradient, plan) = choose(g, routine, &[value], &alternatives);
+    let (mut gradient, routes) = choose(g, routine, &[value], &alternatives);
     let hessian = gradient.split_off(n);
-    (SecondOrder { value, gradient, hessian }, plan)
+    (SecondOrder { value, gradient, hessian }, routes)
 }
 
 /// Returns ∇²U · w, where w are the rates of the coordinates, by second-order reverse accumulation or from ∇²U.
@@ -133,7 +133,7 @@ pub fn hessian_vector(
     routine: &'static str,
     energy: &SecondOrder,
     coordinates: &Coordinates,
-) -> (Vec<NodeId>, Plan) {
+) -> (Vec<NodeId>, Routes) {
     let n = coordinates.len();
     let rates = coordinates.rates(g);
     let formed = (0..n)
@@ -158,7 +158,7 @@ pub fn first_order(
     outputs: &[NodeId],
     coordinates: &Coordinates,
     known: Option<Vec<NodeId>>,
-) -> (Vec<Vec<NodeId>>, Plan) {
+) -> (Vec<Vec<NodeId>>, Routes) {
     let forward = forward::first_derivatives(g, outputs, coordinates, Order::First).concat();
     let mut alternatives = vec![Alternative { name: "forward", nodes: forward, safe: true }];
     let safe = adjoint::is_safe(g, outputs, Order::First, true);
@@ -176,7 +176,7 @@ pub fn first_order(
         // The known derivatives handle the general path themselves.
         alternatives.push(Alternative { name: "as with second derivatives", nodes, safe: true });
     }
-    let (nodes, plan) = choose(g, routine, outputs, &alternatives);
+    let (nodes, routes) = choose(g, routine, outputs, &alternatives);
     let n = coordinates.len();
-    ((0..outputs.len()).map(|row| nodes[row * n..(row + 1) * n].to_vec()).collect(), plan)
+    ((0..outputs.len()).map(|row| nodes[row * n..(row + 1) * n].to_vec()).collect(), routes)
 }

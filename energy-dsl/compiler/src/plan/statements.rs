@@ -1,10 +1,8 @@
-//! The statements of a routine in the order of execution. The Rust renderer (`emit`), the block tape (`tape`) and
-//! planted faults read the same list.
+//! The statements of a routine in the order of execution.
 
 use rustc_hash::FxHashMap;
 
-use crate::budget::Budget;
-use crate::graph::{Graph, NodeId, Op};
+use crate::graph::{Graph, Input, NodeId, Op};
 
 /// Straight-line code. Each statement is one operation; its operands are the numbers of earlier statements.
 #[derive(Clone, Debug, Default)]
@@ -41,34 +39,19 @@ impl Statements {
 pub(crate) const RETURNED: usize = usize::MAX;
 
 /// Puts the nodes of a graph in order: each is computed just before its first use.
-pub(crate) struct Sequence<'a> {
+struct Sequence<'a> {
     graph: &'a Graph,
     places: FxHashMap<NodeId, NodeId>,
     statements: Statements,
 }
 
 impl<'a> Sequence<'a> {
-    pub(crate) fn new(graph: &'a Graph) -> Self {
+    fn new(graph: &'a Graph) -> Self {
         Self { graph, places: FxHashMap::default(), statements: Statements::default() }
     }
 
-    /// Returns the budget that pays for the statements.
-    pub(crate) fn budget(&self) -> &Budget {
-        self.graph.budget()
-    }
-
-    /// Returns the statements so far.
-    pub(crate) fn statements(&self) -> &Statements {
-        &self.statements
-    }
-
-    /// Returns the statements.
-    pub(crate) fn into_statements(self) -> Statements {
-        self.statements
-    }
-
     /// Returns the statement that computes a node, after adding those that it needs.
-    pub(crate) fn value(&mut self, node: NodeId) -> NodeId {
+    fn value(&mut self, node: NodeId) -> NodeId {
         let node = self.graph.resolve(node);
         // Uses an explicit stack, because expressions may be deep.
         let mut stack = vec![node];
@@ -95,7 +78,7 @@ impl<'a> Sequence<'a> {
     }
 
     /// Returns the statements that compute some nodes.
-    pub(crate) fn values(&mut self, nodes: &[NodeId]) -> Vec<NodeId> {
+    fn values(&mut self, nodes: &[NodeId]) -> Vec<NodeId> {
         nodes.iter().map(|&node| self.value(node)).collect()
     }
 
@@ -138,14 +121,14 @@ impl Code {
         let mut sequence = Sequence::new(graph);
         let groups = groups.iter().map(|group| sequence.values(group)).collect();
         let [flags, settled] = [flags, settled].map(|masks| masks.map(|mask| mask.map(|node| sequence.value(node))));
-        Self { statements: sequence.into_statements(), groups, flags, settled, guard: None }
+        Self { statements: sequence.statements, groups, flags, settled, guard: None }
     }
 
     /// Puts the statements that compute a guard in order.
     pub(crate) fn guard(graph: &Graph, node: NodeId) -> Self {
         let mut sequence = Sequence::new(graph);
         let guard = Some(sequence.value(node));
-        Self { statements: sequence.into_statements(), guard, ..Self::default() }
+        Self { statements: sequence.statements, guard, ..Self::default() }
     }
 
     /// Adds the statements of a guard. If `shared`, those that the code already has are not repeated.
@@ -167,6 +150,31 @@ impl Code {
         }
         code.guard = guard.guard.map(|place| places[place.0 as usize]);
         code
+    }
+
+    /// Returns the inputs that the statements read, in order.
+    pub(crate) fn inputs(&self) -> Vec<Input> {
+        let input = |op: &Op| if let Op::Input(input) = *op { Some(input) } else { None };
+        let mut inputs = Vec::new();
+        for input in self.statements.list.iter().filter_map(input) {
+            if !inputs.contains(&input) {
+                inputs.push(input);
+            }
+        }
+        inputs
+    }
+
+    /// Returns whether each statement's result is a number of the results, other than through a comparison.
+    pub(crate) fn are_numbers_of_results(&self) -> Vec<bool> {
+        let list = &self.statements.list;
+        let mut reach = vec![false; list.len()];
+        self.groups.iter().flatten().for_each(|&at| reach[at.0 as usize] = true);
+        for place in (0..list.len()).rev().filter(|&place| !list[place].is_mask()) {
+            if reach[place] {
+                list[place].operands().for_each(|at| reach[at.0 as usize] = true);
+            }
+        }
+        reach
     }
 
     /// Returns all results and masks.
