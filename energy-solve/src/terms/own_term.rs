@@ -9,7 +9,7 @@ use crate::matrix::dof_map::DofMap;
 use crate::matrix::pattern::Pattern;
 use crate::matrix::vector::block_times;
 use crate::terms::counts::Tally;
-use crate::terms::curvature::{Curvature, MOST, change_dense, is_semi_definite};
+use crate::terms::curvature::{Curvature, change_dense, is_semi_definite};
 use crate::terms::linearisation::Linearisation;
 use crate::terms::state::{State, StepStart};
 use crate::terms::stencils::Stencils;
@@ -225,18 +225,11 @@ impl<L: OwnLaw> PlacedOwnTerm<L> {
     }
 }
 
-/// Whether −∂f/∂x, with ∂f/∂x row by row, has no negative eigenvalue, up to rounding. `false` for matrices with more
-/// rows than lanes support.
+/// Whether −∂f/∂x, with ∂f/∂x row by row, has no negative eigenvalue, up to rounding.
 fn is_convex(by_position: &[f64], size: usize) -> bool {
-    if size > MOST {
-        return false;
-    }
-    let mut upper = [0.0; MOST * (MOST + 1) / 2];
     let entries = (0..size).flat_map(|i| (i..size).map(move |j| (i, j)));
-    for (to, (i, j)) in upper.iter_mut().zip(entries) {
-        *to = -by_position[i * size + j];
-    }
-    is_semi_definite(&upper[..size * (size + 1) / 2], size)
+    let upper: Vec<f64> = entries.map(|(i, j)| -by_position[i * size + j]).collect();
+    is_semi_definite(&upper, size)
 }
 
 /// Returns block (i, j) of an element's matrix of 3 n × 3 n numbers.

@@ -4,8 +4,8 @@ use nalgebra::DMatrix;
 use super::Curvature;
 use crate::matrix::vector::transposed;
 
-/// Projects the symmetric matrix with the given triangle of blocks: the fallback for elements with more coordinates
-/// than lanes support, and the reference for all other methods. Returns whether an eigenvalue was changed. A matrix
+/// Projects the symmetric matrix with the given triangle of blocks: for elements whose coordinates are no
+/// independent differences of points, and the reference for all other methods. Returns whether an eigenvalue was changed. A matrix
 /// with a non-finite entry is left unchanged.
 pub fn change_dense(triangle: &mut [Block<f64>], points: usize, curvature: Curvature) -> bool {
     if !triangle.iter().flatten().flatten().all(|entry| entry.is_finite()) {

@@ -4,43 +4,43 @@
 
 use energy_dsl::{Lane, Level, Mask};
 
-use super::{Curvature, MOST, Square};
+use super::{Curvature, Square};
 
 /// Upper limit of the number of sweeps. Convergence is quadratic: 12×12 matrices take six or seven.
 const MOST_SWEEPS: usize = 16;
 
+/// Rotations whose angles are computed together.
+const TOGETHER: usize = 6;
+
 /// Returns the change of the matrix that changes its eigenvalues, and a mask of the changed lanes. `a` becomes
 /// diagonal.
 #[inline(always)]
-pub(super) fn difference<L: Level, V: Lane<f64>, const N: usize>(
-    a: &mut Square<V, N>,
-    curvature: Curvature,
-) -> (Square<V, N>, V::Mask) {
-    let zero = V::splat(0.0);
-    let mut vectors = [[zero; N]; N];
-    for i in 0..N {
-        vectors[i][i] = V::splat(1.0);
+pub(super) fn difference<L: Level, V: Lane<f64>, A: Square<V>>(a: &mut A, curvature: Curvature) -> (A, V::Mask) {
+    let (n, zero) = (a.size(), V::splat(0.0));
+    let mut vectors = a.zeros();
+    for i in 0..n {
+        vectors.set(i, i, V::splat(1.0));
     }
-    diagonalise::<L, V, N>(a, &mut vectors);
-    let mut difference = [[zero; N]; N];
+    diagonalise::<L, V, A>(a, &mut vectors);
+    let mut difference = a.zeros();
     let mut changed = V::Mask::none();
-    for k in 0..N {
-        let change = curvature.change(a[k][k]);
+    for k in 0..n {
+        let change = curvature.change(a.at(k, k));
         let changes = zero.less(change);
         if !changes.any() {
             continue;
         }
         changed = changed | changes;
-        for i in 0..N {
-            let scaled = change * vectors[k][i];
-            for j in i..N {
-                difference[i][j] = scaled.mul_add::<L>(vectors[k][j], difference[i][j]);
+        for i in 0..n {
+            let scaled = change * vectors.at(k, i);
+            for j in i..n {
+                difference.set(i, j, scaled.mul_add::<L>(vectors.at(k, j), difference.at(i, j)));
             }
         }
     }
-    for i in 0..N {
+    for i in 0..n {
         for j in 0..i {
-            difference[i][j] = difference[j][i];
+            difference.set(i, j, difference.at(j, i));
         }
     }
     (difference, changed)
@@ -51,28 +51,33 @@ pub(super) fn difference<L: Level, V: Lane<f64>, const N: usize>(
 /// A sweep consists of rounds of rotations without common rows, in the order of a round-robin tournament (Brent and Luk
 /// 1985). Computing an angle has a longer latency than applying it, and the angles of a round are independent.
 #[inline(always)]
-fn diagonalise<L: Level, V: Lane<f64>, const N: usize>(a: &mut Square<V, N>, vectors: &mut Square<V, N>) {
-    let zero = V::splat(0.0);
+fn diagonalise<L: Level, V: Lane<f64>, A: Square<V>>(a: &mut A, vectors: &mut A) {
+    let (n, zero) = (a.size(), V::splat(0.0));
     let mut squares = zero;
-    for i in 0..N {
-        for j in 0..N {
-            squares = squares + a[i][j] * a[i][j];
+    for i in 0..n {
+        for j in 0..n {
+            squares = squares + a.at(i, j) * a.at(i, j);
         }
     }
     let negligible = squares * V::splat(f64::EPSILON * f64::EPSILON / 16.0);
     for _ in 0..MOST_SWEEPS {
         let mut rotated = V::Mask::none();
-        for round in 0..rounds(N) {
-            let mut rotations = [Rotation::none(); MOST / 2];
-            for slot in 0..N / 2 {
-                let (p, q) = pair(N, round, slot);
-                rotations[slot] = Rotation::between::<L>(a[p][p], a[q][q], a[p][q], negligible);
-                rotated = rotated | rotations[slot].active;
-            }
-            for slot in 0..N / 2 {
-                if rotations[slot].active.any() {
-                    rotations[slot].apply::<L, N>(pair(N, round, slot), a, vectors);
+        for round in 0..rounds(n) {
+            let mut first = 0;
+            while first < n / 2 {
+                let count = TOGETHER.min(n / 2 - first);
+                let mut rotations = [Rotation::none(); TOGETHER];
+                for slot in 0..count {
+                    let (p, q) = pair(n, round, first + slot);
+                    rotations[slot] = Rotation::between::<L>(a.at(p, p), a.at(q, q), a.at(p, q), negligible);
+                    rotated = rotated | rotations[slot].active;
                 }
+                for slot in 0..count {
+                    if rotations[slot].active.any() {
+                        rotations[slot].apply::<L, A>(pair(n, round, first + slot), a, vectors);
+                    }
+                }
+                first += TOGETHER;
             }
         }
         if !rotated.any() {
@@ -144,29 +149,32 @@ impl<V: Lane<f64>> Rotation<V> {
 
     /// A ← Rᵀ A R, of which the upper triangle is stored, and V ← Rᵀ V.
     #[inline(always)]
-    fn apply<L: Level, const N: usize>(
-        &self,
-        (p, q): (usize, usize),
-        a: &mut Square<V, N>,
-        vectors: &mut Square<V, N>,
-    ) {
-        let (zero, off) = (V::splat(0.0), a[p][q]);
+    fn apply<L: Level, A: Square<V>>(&self, (p, q): (usize, usize), a: &mut A, vectors: &mut A) {
+        let (n, zero, off) = (a.size(), V::splat(0.0), a.at(p, q));
         let shift = V::select(self.active, self.tangent * off, zero);
-        a[p][p] = a[p][p] - shift;
-        a[q][q] = a[q][q] + shift;
-        a[p][q] = V::select(self.active, zero, off);
+        a.set(p, p, a.at(p, p) - shift);
+        a.set(q, q, a.at(q, q) + shift);
+        a.set(p, q, V::select(self.active, zero, off));
         for k in 0..p {
-            (a[k][p], a[k][q]) = self.rotated::<L>(a[k][p], a[k][q]);
+            self.rotate::<L, A>(a, (k, p), (k, q));
         }
         for k in p + 1..q {
-            (a[p][k], a[k][q]) = self.rotated::<L>(a[p][k], a[k][q]);
+            self.rotate::<L, A>(a, (p, k), (k, q));
         }
-        for k in q + 1..N {
-            (a[p][k], a[q][k]) = self.rotated::<L>(a[p][k], a[q][k]);
+        for k in q + 1..n {
+            self.rotate::<L, A>(a, (p, k), (q, k));
         }
-        for k in 0..N {
-            (vectors[p][k], vectors[q][k]) = self.rotated::<L>(vectors[p][k], vectors[q][k]);
+        for k in 0..n {
+            self.rotate::<L, A>(vectors, (p, k), (q, k));
         }
+    }
+
+    /// Rotates two entries.
+    #[inline(always)]
+    fn rotate<L: Level, A: Square<V>>(&self, a: &mut A, first: (usize, usize), second: (usize, usize)) {
+        let (g, h) = self.rotated::<L>(a.at(first.0, first.1), a.at(second.0, second.1));
+        a.set(first.0, first.1, g);
+        a.set(second.0, second.1, h);
     }
 
     /// Returns (g cos φ − h sin φ, h cos φ + g sin φ).

@@ -11,13 +11,15 @@ mod jacobi;
 mod orthonormal;
 mod planar;
 mod radial;
+mod square;
 
-use energy_dsl::{Kernel, Lane, Level, LevelName, Mask, dispatch_at};
+use energy_dsl::{Kernel, Lane, Level, LevelName, Mask, Number, dispatch_at};
 
 pub(crate) use definite::is_semi_definite;
 pub use dense::change_dense;
 pub(crate) use hinge::Hinges;
 pub(crate) use orthonormal::Orthonormal;
+use square::{AnySquare, Square};
 
 /// Treatment of negative eigenvalues of element Hessians. Force laws have no Hessian; their Jacobians are used
 /// unchanged.
@@ -52,11 +54,8 @@ impl Curvature {
     }
 }
 
-/// The largest number of coordinates that lanes support.
-pub(crate) const MOST: usize = 12;
-
-/// A square matrix per lane.
-type Square<V, const N: usize> = [[V; N]; N];
+/// The largest number of coordinates whose matrices are arrays.
+const MOST: usize = 12;
 
 /// Returns the index of entry (i, j), i ≤ j, in the upper triangle of an n×n matrix, row by row.
 #[inline(always)]
@@ -85,23 +84,67 @@ fn are_finite<V: Lane<f64>>(numbers: &[V]) -> V::Mask {
     products.equal(zero)
 }
 
-/// The largest number of inputs of a projection: the upper triangle, then two difference vectors.
-pub(crate) const MOST_NUMBERS: usize = MOST * (MOST + 1) / 2 + 6;
-
-/// Projection of Hessians of `n` coordinates, one per lane, some of them indefinite. It does not depend on the type of
-/// element, so it is compiled once per SIMD level instead of into each element's loop.
-#[derive(Debug)]
-pub(crate) struct Indefinite<'a> {
-    pub(crate) n: usize,
+/// How Hessians are projected.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Projection<'a> {
     pub(crate) curvature: Curvature,
     pub(crate) orthonormal: &'a Orthonormal,
+    /// Number of coordinates.
+    pub(crate) n: usize,
     /// The number of difference vectors, if it is 1 or 2; otherwise 0.
     pub(crate) vectors: usize,
+}
+
+impl Projection<'_> {
+    /// Projects the Hessians of some elements, as many at a time as there are lanes. `first` returns the place of an
+    /// element's first number; its others follow at a `stride`: first those of the upper triangle, then those of the
+    /// vectors. Calls `changed` for each element that was changed.
+    pub(crate) fn change_some<L: Level>(
+        self,
+        elements: &[usize],
+        (numbers, stride): (&mut [f64], usize),
+        first: impl Fn(usize) -> usize,
+        mut changed: impl FnMut(usize),
+    ) {
+        let lanes = <L::F64 as Lane<f64>>::LANES;
+        let upper = self.n * (self.n + 1) / 2;
+        let mut stored = vec![0.0; (upper + 3 * self.vectors) * lanes];
+        for chunk in elements.chunks(lanes) {
+            let open = u32::MAX >> (32 - chunk.len());
+            let start = first(chunk[0]);
+            let are_together =
+                stride == lanes && (0..lanes).all(|lane| chunk.get(lane).map(|&e| first(e)) == Some(start + lane));
+            if are_together {
+                let numbers = &mut numbers[start..][..stored.len()];
+                let bits = Indefinite { projection: self, open, numbers }.change(L::NAME);
+                chunk.iter().enumerate().filter(|(lane, _)| bits >> lane & 1 == 1).for_each(|(_, &e)| changed(e));
+                continue;
+            }
+            for lane in 0..lanes {
+                // Surplus lanes repeat the last element.
+                let own = numbers[first(chunk[lane.min(chunk.len() - 1)])..].iter().step_by(stride);
+                stored[lane..].iter_mut().step_by(lanes).zip(own).for_each(|(stored, number)| *stored = *number);
+            }
+            let bits = Indefinite { projection: self, open, numbers: &mut stored }.change(L::NAME);
+            for (lane, &element) in chunk.iter().enumerate().filter(|(lane, _)| bits >> lane & 1 == 1) {
+                let own = numbers[first(element)..].iter_mut().step_by(stride).take(upper);
+                own.zip(stored[lane..].iter().step_by(lanes)).for_each(|(number, stored)| *number = *stored);
+                changed(element);
+            }
+        }
+    }
+}
+
+/// Projection of Hessians, one per lane, some of them indefinite. It does not depend on the type of element, so it is
+/// compiled once per SIMD level instead of into each element's loop.
+#[derive(Debug)]
+struct Indefinite<'a> {
+    projection: Projection<'a>,
     /// Bit mask of the lanes with an indefinite Hessian.
-    pub(crate) open: u32,
+    open: u32,
     /// Upper triangles by the difference vectors of `orthonormal`, then these vectors; each number is stored for all
     /// lanes together.
-    pub(crate) numbers: &'a mut [f64],
+    numbers: &'a mut [f64],
 }
 
 impl Indefinite<'_> {
@@ -109,9 +152,16 @@ impl Indefinite<'_> {
     /// bits, and so do lanes with a non-finite entry.
     ///
     /// `level` is the SIMD level whose lanes the numbers are laid out for.
-    pub(crate) fn change(self, level: &str) -> u32 {
+    fn change(self, level: &str) -> u32 {
         let name = level.parse::<LevelName>().ok();
         name.and_then(|name| dispatch_at(name, self)).expect("the caller runs at this SIMD level")
+    }
+
+    #[inline(always)]
+    fn store<V: Lane<f64>>(self, upper: &[V]) {
+        for (number, stored) in upper.iter().zip(self.numbers.chunks_exact_mut(V::LANES)) {
+            number.store(stored);
+        }
     }
 }
 
@@ -120,19 +170,27 @@ impl Kernel for Indefinite<'_> {
 
     #[inline(always)]
     fn run<L: Level>(self) -> u32 {
+        let Projection { curvature, orthonormal, n, vectors } = self.projection;
         let lanes = <L::F64 as Lane<f64>>::LANES;
-        let entries = self.n * (self.n + 1) / 2;
-        let mut numbers = [L::F64::splat(0.0); MOST_NUMBERS];
+        let entries = n * (n + 1) / 2;
+        if n > MOST {
+            let mut upper = vec![L::F64::splat(0.0); entries];
+            for (number, stored) in upper.iter_mut().zip(self.numbers.chunks_exact(lanes)) {
+                *number = L::F64::load(stored);
+            }
+            let open = <L::F64 as Number>::Mask::from_bits(self.open) & are_finite(&upper);
+            let changed = change_rest::<L, _, _>(&mut upper, AnySquare::zeros_of(n), curvature, orthonormal, open);
+            self.store(&upper);
+            return changed.bits();
+        }
+        let mut numbers = [L::F64::splat(0.0); MOST * (MOST + 1) / 2 + 6];
         for (number, stored) in numbers.iter_mut().zip(self.numbers.chunks_exact(lanes)) {
             *number = L::F64::load(stored);
         }
-        let (upper, vectors) = numbers.split_at_mut(entries);
-        let vectors = vectors.as_chunks::<3>().0;
-        let changed =
-            change::<L, _>(upper, self.n, self.curvature, self.orthonormal, &vectors[..self.vectors], self.open);
-        for (number, stored) in upper.iter().zip(self.numbers.chunks_exact_mut(lanes)) {
-            number.store(stored);
-        }
+        let (upper, known) = numbers.split_at_mut(entries);
+        let known = &known.as_chunks::<3>().0[..vectors];
+        let changed = change::<L, _>(upper, n, curvature, orthonormal, known, self.open);
+        self.store(upper);
         changed.bits()
     }
 }
@@ -167,17 +225,18 @@ fn change<L: Level, V: Lane<f64>>(
     }
     changed
         | match n {
-            3 => change_rest::<L, V, 3>(upper, curvature, orthonormal, open),
-            6 => change_rest::<L, V, 6>(upper, curvature, orthonormal, open),
-            9 => change_rest::<L, V, 9>(upper, curvature, orthonormal, open),
-            _ => change_rest::<L, V, MOST>(upper, curvature, orthonormal, open),
+            3 => change_rest::<L, V, _>(upper, [[V::splat(0.0); 3]; 3], curvature, orthonormal, open),
+            6 => change_rest::<L, V, _>(upper, [[V::splat(0.0); 6]; 6], curvature, orthonormal, open),
+            9 => change_rest::<L, V, _>(upper, [[V::splat(0.0); 9]; 9], curvature, orthonormal, open),
+            _ => change_rest::<L, V, _>(upper, [[V::splat(0.0); MOST]; MOST], curvature, orthonormal, open),
         }
 }
 
-/// [`change`] for Hessians without known structure.
+/// [`change`] for Hessians without known structure; `zeros` has their size.
 #[inline(always)]
-fn change_rest<L: Level, V: Lane<f64>, const N: usize>(
+fn change_rest<L: Level, V: Lane<f64>, A: Square<V>>(
     upper: &mut [V],
+    zeros: A,
     curvature: Curvature,
     orthonormal: &Orthonormal,
     open: V::Mask,
@@ -185,39 +244,39 @@ fn change_rest<L: Level, V: Lane<f64>, const N: usize>(
     if !open.any() {
         return open;
     }
-    let (mut a, scale) = scaled_square::<V, N>(upper);
+    let mut a = zeros;
+    let scale = fill_scaled(&mut a, upper);
     orthonormal.make_orthonormal(&mut a);
-    let (mut difference, changed) = jacobi::difference::<L, V, N>(&mut a, curvature);
+    let (mut difference, changed) = jacobi::difference::<L, V, A>(&mut a, curvature);
     let changed = changed & open;
     orthonormal.make_differences(&mut difference);
     add_to(upper, &difference, scale, changed);
     changed
 }
 
-/// Returns the whole matrix, scaled by a power of two to entries of about 1, so that squares neither overflow nor
-/// vanish; and the scale.
+/// Fills a matrix, scaled by a power of two to entries of about 1, so that squares neither overflow nor vanish. Returns
+/// the scale.
 #[inline(always)]
-fn scaled_square<V: Lane<f64>, const N: usize>(upper: &[V]) -> (Square<V, N>, V) {
-    let scale = largest_of(upper).power_of_two_scale();
-    let mut a = [[V::splat(0.0); N]; N];
-    for i in 0..N {
-        for j in i..N {
-            let entry = upper[upper_index(N, i, j)] * scale;
-            a[i][j] = entry;
-            a[j][i] = entry;
+fn fill_scaled<V: Lane<f64>, A: Square<V>>(a: &mut A, upper: &[V]) -> V {
+    let (n, scale) = (a.size(), largest_of(upper).power_of_two_scale());
+    for i in 0..n {
+        for j in i..n {
+            let entry = upper[upper_index(n, i, j)] * scale;
+            a.set(i, j, entry);
+            a.set(j, i, entry);
         }
     }
-    (a, scale)
+    scale
 }
 
 /// Adds a scaled difference in the `wanted` lanes.
 #[inline(always)]
-fn add_to<V: Lane<f64>, const N: usize>(upper: &mut [V], difference: &Square<V, N>, scale: V, wanted: V::Mask) {
-    let unscale = V::splat(1.0) / scale;
-    for i in 0..N {
-        for j in i..N {
-            let entry = &mut upper[upper_index(N, i, j)];
-            *entry = V::select(wanted, *entry + difference[i][j] * unscale, *entry);
+fn add_to<V: Lane<f64>, A: Square<V>>(upper: &mut [V], difference: &A, scale: V, wanted: V::Mask) {
+    let (n, unscale) = (difference.size(), V::splat(1.0) / scale);
+    for i in 0..n {
+        for j in i..n {
+            let entry = &mut upper[upper_index(n, i, j)];
+            *entry = V::select(wanted, *entry + difference.at(i, j) * unscale, *entry);
         }
     }
 }

@@ -2,9 +2,6 @@ use energy_dsl::{Declaration, Lane};
 
 use super::{MOST, Square};
 
-/// The largest number of difference vectors.
-const VECTORS: usize = MOST / 3;
-
 /// Transformation between an element's difference vectors and orthonormal ones with the same span.
 ///
 /// Let q = D x be the difference vectors (D ⊗ 1₃ acts on the points' coordinates) and H the Hessian by q. The Hessian
@@ -14,17 +11,17 @@ const VECTORS: usize = MOST / 3;
 #[derive(Clone, Debug)]
 pub(crate) struct Orthonormal {
     /// The triangle L.
-    lower: [[f64; VECTORS]; VECTORS],
+    lower: Triangle,
     /// The triangle L⁻¹.
-    inverse: [[f64; VECTORS]; VECTORS],
+    inverse: Triangle,
 }
 
 impl Orthonormal {
-    /// Creates the transformation for a declaration. `None` if there are too many difference vectors, or they are
-    /// linearly dependent.
+    /// Creates the transformation for a declaration. `None` if there are no difference vectors, or they are linearly
+    /// dependent.
     pub(crate) fn new(declaration: &Declaration) -> Option<Self> {
         let vectors = &*declaration.reduced_vectors;
-        if vectors.is_empty() || vectors.len() > VECTORS || declaration.reduced_coordinates != 3 * vectors.len() {
+        if vectors.is_empty() || declaration.reduced_coordinates != 3 * vectors.len() {
             return None;
         }
         let sign = |added: bool| if added { 1.0 } else { -1.0 };
@@ -33,7 +30,7 @@ impl Orthonormal {
             terms.filter(|(p, q)| p.0 == q.0).map(|(p, q)| sign(p.1) * sign(q.1)).sum()
         };
         let n = vectors.len();
-        let (mut lower, mut inverse) = ([[0.0; VECTORS]; VECTORS], [[0.0; VECTORS]; VECTORS]);
+        let (mut lower, mut inverse) = (vec![vec![0.0; n]; n], vec![vec![0.0; n]; n]);
         for i in 0..n {
             for j in 0..=i {
                 let known: f64 = (0..j).map(|k| lower[i][k] * lower[j][k]).sum();
@@ -51,51 +48,59 @@ impl Orthonormal {
                 inverse[i][j] = -sum / lower[i][i];
             }
         }
-        Some(Self { lower, inverse })
+        Some(Self { lower: Triangle::new(lower), inverse: Triangle::new(inverse) })
     }
 
     /// H ← Lᵀ H L, for a symmetric H.
     #[inline(always)]
-    pub(super) fn make_orthonormal<V: Lane<f64>, const N: usize>(&self, h: &mut Square<V, N>) {
-        self.congruent(&self.lower, h);
+    pub(super) fn make_orthonormal<V: Lane<f64>, A: Square<V>>(&self, h: &mut A) {
+        self.lower.make_congruent(h);
     }
 
     /// H ← L⁻ᵀ H L⁻¹, for a symmetric H.
     #[inline(always)]
-    pub(super) fn make_differences<V: Lane<f64>, const N: usize>(&self, h: &mut Square<V, N>) {
-        self.congruent(&self.inverse, h);
+    pub(super) fn make_differences<V: Lane<f64>, A: Square<V>>(&self, h: &mut A) {
+        self.inverse.make_congruent(h);
+    }
+}
+
+/// A lower triangle.
+#[derive(Clone, Debug)]
+struct Triangle {
+    rows: Vec<Vec<f64>>,
+    /// The first rows again, for matrices whose size is known when this is compiled.
+    array: [[f64; MOST / 3]; MOST / 3],
+}
+
+impl Triangle {
+    fn new(rows: Vec<Vec<f64>>) -> Self {
+        let entry = |i: usize, j: usize| rows.get(i).and_then(|row| row.get(j)).copied().unwrap_or(0.0);
+        let array = std::array::from_fn(|i| std::array::from_fn(|j| entry(i, j)));
+        Self { rows, array }
     }
 
-    /// H ← Tᵀ H T.
+    /// H ← (T ⊗ 1₃)ᵀ H (T ⊗ 1₃) for a symmetric H.
     #[inline(always)]
-    fn congruent<V: Lane<f64>, const N: usize>(&self, t: &[[f64; VECTORS]; VECTORS], h: &mut Square<V, N>) {
-        if N == 3 {
+    fn make_congruent<V: Lane<f64>, A: Square<V>>(&self, h: &mut A) {
+        let n = h.size();
+        if n == 3 {
             return; // a single vector only changes its length, which eigenvectors do not see
         }
         // Twice H ← (H T)ᵀ.
         for _ in 0..2 {
-            let old = *h;
-            for row in 0..N {
-                let turned = columns_times(t, &old[row]);
-                for column in 0..N {
-                    h[column][row] = turned[column];
+            let old = h.clone();
+            for row in 0..n {
+                for vector in 0..n / 3 {
+                    for axis in 0..3 {
+                        let mut sum = V::splat(0.0);
+                        for k in vector..n / 3 {
+                            let factor = if n <= MOST { self.array[k][vector] } else { self.rows[k][vector] };
+                            sum = sum + V::splat(factor) * old.at(row, 3 * k + axis);
+                        }
+                        h.set(3 * vector + axis, row, sum);
+                    }
                 }
             }
         }
     }
-}
-
-/// Returns (T ⊗ 1₃)ᵀ z for a lower triangle T.
-#[inline(always)]
-fn columns_times<V: Lane<f64>, const N: usize>(t: &[[f64; VECTORS]; VECTORS], z: &[V; N]) -> [V; N] {
-    let mut product = [V::splat(0.0); N];
-    for vector in 0..N / 3 {
-        for k in vector..N / 3 {
-            for axis in 0..3 {
-                let place = 3 * vector + axis;
-                product[place] = product[place] + V::splat(t[k][vector]) * z[3 * k + axis];
-            }
-        }
-    }
-    product
 }

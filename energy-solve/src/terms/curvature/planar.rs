@@ -1,7 +1,7 @@
 use energy_dsl::{Lane, Level, Mask};
 
 use super::definite::is_semi_definite;
-use super::{Curvature, Orthonormal, Square, add_to, jacobi, scaled_square, upper_index};
+use super::{Curvature, Orthonormal, add_to, fill_scaled, jacobi, upper_index};
 
 /// Tolerance of the entries that should vanish, relative to the largest entry.
 const TOLERANCE: f64 = 1e-10;
@@ -34,7 +34,8 @@ pub(super) fn change<L: Level, V: Lane<f64>>(
     let [t, _, n] = frame;
     frame[1] = [n[1] * t[2] - n[2] * t[1], n[2] * t[0] - n[0] * t[2], n[0] * t[1] - n[1] * t[0]];
 
-    let (mut a, scale) = scaled_square::<V, 6>(upper);
+    let mut a = [[one; 6]; 6];
+    let scale = fill_scaled(&mut a, upper);
     orthonormal.make_orthonormal(&mut a);
     turn(&mut a, &frame);
     let mut planar = open & spans;
@@ -56,7 +57,7 @@ pub(super) fn change<L: Level, V: Lane<f64>>(
             out[i][j] = a[row][column];
         }
     }
-    let (part, mut changed) = jacobi::difference::<L, V, 2>(&mut out, curvature);
+    let (part, mut changed) = jacobi::difference::<L, V, _>(&mut out, curvature);
     for (i, row) in [2, 5].into_iter().enumerate() {
         for (j, column) in [2, 5].into_iter().enumerate() {
             difference[row][column] = part[i][j];
@@ -75,7 +76,7 @@ pub(super) fn change<L: Level, V: Lane<f64>>(
     }
     let indefinite = planar & !is_semi_definite(&within_upper, 4);
     if indefinite.any() {
-        let (part, also) = jacobi::difference::<L, V, 4>(&mut within, curvature);
+        let (part, also) = jacobi::difference::<L, V, _>(&mut within, curvature);
         changed = changed | (also & indefinite);
         for i in 0..4 {
             for j in 0..4 {
@@ -107,7 +108,7 @@ fn square<V: Lane<f64>>(a: [V; 3]) -> V {
 
 /// A ← R A Rᵀ for a symmetric A, where R acts on both vectors.
 #[inline(always)]
-fn turn<V: Lane<f64>>(a: &mut Square<V, 6>, r: &[[V; 3]; 3]) {
+fn turn<V: Lane<f64>>(a: &mut [[V; 6]; 6], r: &[[V; 3]; 3]) {
     // Twice A ← (R A)ᵀ.
     for _ in 0..2 {
         let old = *a;

@@ -1,14 +1,16 @@
 //! Elements that a term evaluates in lanes: generated ones, or tapes.
 
 use std::fmt::Debug;
+use std::marker::PhantomData;
 use std::ops::Range;
 
 use energy_dsl::{
-    Array, BLOCK, Batch, BatchWork, Block, Declaration, Kernel, Lane, Level, Number, Packed, PackedPotential,
-    Potential, ReducedPotential, Vector3, WidePoints, for_each_batch_in,
+    Array, BLOCK, Batch, BatchWork, Declaration, Flags, Kernel, Lane, Level, Mask, Number, Packed, PackedPotential,
+    Potential, ReducedHessian, ReducedPotential, Vector3, WidePoints, dispatch, for_each_batch_in,
 };
 
-use super::work::{Expanded, Gradients, Hessians, Values, lanes_in};
+use super::waiting::Held;
+use super::work::{Examined, Expanded, Gradients, Hessians, Values, difference_vectors, lanes_in};
 use crate::terms::scatter::Lanes;
 
 /// Elements of one type, packed for lanes. Ranges start at multiples of [`Evaluated::PACK`].
@@ -57,6 +59,9 @@ impl<E: PackedPotential<f64> + Debug + Send + Sync + 'static> Evaluated for Pack
 
     fn hessians(&self, packs: &[Range<usize>], x: &[Vector3<f64>], work: &mut Hessians<'_, '_>) {
         packs.iter().for_each(|pack| for_each_batch_in(self, pack.clone(), x, work));
+        if !work.waiting.is_empty() {
+            dispatch(Release::<E>::of(work));
+        }
     }
 
     fn each_gradient(&self, x: &[Vector3<f64>], each: &mut dyn FnMut(usize, f64, &[f64])) {
@@ -100,41 +105,87 @@ impl<E: PackedPotential<f64>> BatchWork<E> for Hessians<'_, '_> {
         let lanes = lanes(&batch);
         let mut reduced = batch.element.reduced_hessian_at::<L>(batch.points);
         let n = <<E::Wide<L::F64> as ReducedPotential<L::F64>>::Coordinates as Array<L::F64>>::LEN;
-        let derivatives = (reduced.gradient.as_ref(), reduced.hessian.as_mut());
-        let projected = self.project::<L>(E::DECLARATION, &lanes, derivatives, n, batch.points.as_ref());
-        let mut result = <E::Wide<L::F64> as ReducedPotential<L::F64>>::expand::<{ u32::MAX }>(&reduced);
-        let flagged = lanes_in(result.flags.degenerate | result.flags.kink, batch.count);
-        L::F64::dispatch(Addition {
-            to: self,
-            lanes,
-            value: result.value,
-            gradient: &result.gradient,
-            triangle: &mut result.hessian,
-            bits: (flagged, projected),
-        });
+        let (derivatives, points) = ((reduced.gradient.as_ref(), reduced.hessian.as_mut()), batch.points.as_ref());
+        let Examined { open, changed } = self.examine::<L>(E::DECLARATION, &lanes, derivatives, n, points);
+        if open == 0 && self.waiting.is_empty() {
+            L::F64::dispatch(Addition::<E, _> { to: self, lanes, reduced: &reduced, changed });
+            return;
+        }
+        let Flags { degenerate, kink } = reduced.flags;
+        let Lanes { first, count, .. } = lanes;
+        let held = Held { first, count, degenerate: degenerate.bits(), kink: kink.bits(), changed };
+        let vectors = difference_vectors::<L>(E::DECLARATION, points);
+        let numbers = [&[reduced.value], reduced.gradient.as_ref(), reduced.hessian.as_ref(), vectors.as_flattened()];
+        self.waiting.hold(held, open, (&lanes, points.len()), numbers);
+        if self.waiting.is_full(<L::F64 as Lane<f64>>::LANES) {
+            L::F64::dispatch(Release::<E>::of(self));
+        }
     }
 }
 
-/// Adds the results of a batch to a linearisation. Elements with equally many points share this code: a [`Kernel`] of
-/// its own is compiled for the SIMD level without being inlined.
-struct Addition<'k, 'a, 'b, V, P, T> {
+/// Adds the batches that wait, after their Hessians were projected.
+struct Release<'k, 'a, 'b, E> {
     to: &'k mut Hessians<'a, 'b>,
-    lanes: Lanes<'k>,
-    value: V,
-    gradient: &'k P,
-    triangle: &'k mut T,
-    /// Flagged and projected lanes.
-    bits: (u32, u32),
+    of: PhantomData<E>,
 }
 
-impl<V: Lane<f64>, P: Array<Vector3<V>>, T: Array<Block<V>>> Kernel for Addition<'_, '_, '_, V, P, T> {
+impl<'k, 'a, 'b, E> Release<'k, 'a, 'b, E> {
+    fn of(to: &'k mut Hessians<'a, 'b>) -> Self {
+        Self { to, of: PhantomData }
+    }
+}
+
+impl<E: PackedPotential<f64>> Kernel for Release<'_, '_, '_, E> {
     type Output = ();
 
     #[inline(always)]
     fn run<L: Level>(self) {
-        let Self { to, lanes, value, gradient, triangle, bits } = self;
-        let (mut v, mut sums) = (*gradient, *gradient);
-        let numbers = Expanded { value, gradient: gradient.as_ref(), triangle: triangle.as_mut() };
-        to.add(&lanes, numbers, bits, [v.as_mut(), sums.as_mut()]);
+        let to = self.to;
+        let Some(projection) = to.projection(E::DECLARATION) else { return };
+        let mut waiting = std::mem::take(&mut to.waiting);
+        waiting.project::<L>(projection);
+        waiting.release::<L::F64>(|held, lanes, numbers| {
+            let mut numbers = numbers.chunks_exact(<L::F64 as Lane<f64>>::LANES).map(L::F64::load);
+            let mut next = |_: usize| numbers.next().expect("all numbers were stored");
+            let mask = |bits: u32| <L::F64 as Number>::Mask::from_bits(bits);
+            let flags = Flags { degenerate: mask(held.degenerate), kink: mask(held.kink) };
+            let value = next(0);
+            let (gradient, hessian) = (Array::from_fn(&mut next), Array::from_fn(&mut next));
+            let reduced = ReducedHessian { value, gradient, hessian, flags };
+            L::F64::dispatch(Addition::<E, _> { to: &mut *to, lanes, reduced: &reduced, changed: held.changed });
+        });
+        to.waiting = waiting;
+    }
+}
+
+/// The reduced Hessian of elements in lanes.
+type Reduced<E, V> = ReducedHessian<
+    V,
+    <<E as PackedPotential<f64>>::Wide<V> as ReducedPotential<V>>::Coordinates,
+    <<E as PackedPotential<f64>>::Wide<V> as ReducedPotential<V>>::Upper,
+>;
+
+/// Expands the results of a batch and adds them to a linearisation. A [`Kernel`] of its own is compiled for the SIMD
+/// level without being inlined.
+struct Addition<'k, 'a, 'b, E: PackedPotential<f64>, V: Lane<f64>> {
+    to: &'k mut Hessians<'a, 'b>,
+    lanes: Lanes<'k>,
+    reduced: &'k Reduced<E, V>,
+    /// Bits of the changed lanes.
+    changed: u32,
+}
+
+impl<E: PackedPotential<f64>, V: Lane<f64>> Kernel for Addition<'_, '_, '_, E, V> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<L: Level>(self) {
+        let Self { to, lanes, reduced, changed } = self;
+        let mut result = <E::Wide<V> as ReducedPotential<V>>::expand::<{ u32::MAX }>(reduced);
+        let flagged = lanes_in(result.flags.degenerate | result.flags.kink, lanes.count);
+        let (mut v, mut sums) = (result.gradient, result.gradient);
+        let numbers =
+            Expanded { value: result.value, gradient: result.gradient.as_ref(), triangle: result.hessian.as_mut() };
+        to.add(&lanes, numbers, (flagged, changed), [v.as_mut(), sums.as_mut()]);
     }
 }

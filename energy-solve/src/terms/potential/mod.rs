@@ -9,6 +9,7 @@ mod pack_energies;
 mod placed;
 mod steered;
 mod tapes;
+mod waiting;
 mod work;
 
 use std::fmt::Debug;

@@ -7,8 +7,9 @@ use energy_dsl::tape::{BlockResults, Expander, Places, Results, Slot, TAPE_BLOCK
 use energy_dsl::{Declaration, Kernel, Lane, Level, RoutineKind, Vector3, dispatch};
 
 use super::evaluated::Evaluated;
-use super::work::{Expanded, Gradients, Hessians, Values};
+use super::work::{Expanded, Gradients, Hessians, Values, difference_vectors};
 use crate::terms::active::Active;
+use crate::terms::curvature::Projection;
 use crate::terms::scatter::Lanes;
 use crate::terms::stencils::Stencils;
 
@@ -99,17 +100,18 @@ impl Evaluated for TapePacks {
 
     fn hessians(&self, packs: &[Range<usize>], x: &[Vector3<f64>], work: &mut Hessians<'_, '_>) {
         let mut expander = Expander::new(&self.elements).expect("an energy has an expansion");
-        let mut reduced: Vec<Slot<f64>> = vec![[0.0; TAPE_BLOCK]; self.identity.len()];
+        // All results, and two difference vectors.
+        let mut reduced: Vec<Slot<f64>> = vec![[0.0; TAPE_BLOCK]; self.identity.len() + 6];
         self.for_each_block(RoutineKind::ReducedHessian, packs, x, &mut |block, stencils| {
             let BlockResults { first, count, results, flags } = block;
             let mut projected = [0; TAPE_BLOCK];
-            let results = if work.is_projected() {
-                for (number, slot) in reduced.iter_mut().enumerate() {
+            let results = if let Some(projection) = work.projection(&self.declaration) {
+                for (number, slot) in reduced.iter_mut().enumerate().take(results.len()) {
                     *slot = *results.number(number);
                 }
                 let block = (first, count);
-                let (declaration, reduced) = (&*self.declaration, &mut reduced[..]);
-                dispatch(Project { declaration, block, stencils, reduced, x, projected: &mut projected, work });
+                let (declaration, reduced, projected) = (&*self.declaration, &mut reduced[..], &mut projected);
+                dispatch(Project { declaration, projection, block, stencils, reduced, x, projected, work });
                 Results::new(&reduced[..], &self.identity)
             } else {
                 results
@@ -202,9 +204,11 @@ impl Kernel for AddGradients<'_, '_> {
 /// Makes the reduced Hessians of a block positive semi-definite.
 struct Project<'a, 'w, 'b> {
     declaration: &'a Declaration,
+    projection: Projection<'w>,
     /// Index of the first element, and number of elements.
     block: (usize, usize),
     stencils: &'a [u32],
+    /// Results, and room for two difference vectors.
     reduced: &'a mut [Slot<f64>],
     x: &'a [Vector3<f64>],
     /// Bits of the changed lanes, by the first element of the lanes.
@@ -217,31 +221,48 @@ impl Kernel for Project<'_, '_, '_> {
 
     #[inline(always)]
     fn run<L: Level>(self) {
-        let Self { declaration, block: (first, count), stencils, reduced, x, projected, work } = self;
+        let Self { declaration, projection, block: (first, count), stencils, reduced, x, projected, work } = self;
         let n = declaration.reduced_coordinates;
-        let (value_and_gradient, slots) = reduced.split_at_mut(1 + n);
+        let (value_and_gradient, numbers) = reduced.split_at_mut(1 + n);
+        let entries = numbers.len() - 6;
         let mut gradient = vec![L::F64::splat(0.0); n];
-        let mut hessian = vec![L::F64::splat(0.0); slots.len()];
+        let mut hessian = vec![L::F64::splat(0.0); entries];
         let mut points = vec![[L::F64::splat(0.0); 3]; declaration.points.len()];
-        let mut at = 0;
-        while at < count {
+        let per_batch = <L::F64 as Lane<f64>>::LANES;
+        let mut open = Vec::new();
+        for at in (0..count).step_by(per_batch) {
             let lanes = lanes::<L>(first, count, at, stencils);
-            for (number, slot) in
-                gradient.iter_mut().chain(&mut hessian).zip(value_and_gradient[1..].iter().chain(&*slots))
-            {
+            let slots = value_and_gradient[1..].iter().chain(&numbers[..entries]);
+            for (number, slot) in gradient.iter_mut().chain(&mut hessian).zip(slots) {
                 *number = L::F64::load(&slot[at..]);
             }
             for point in 0..points.len() {
                 points[point] = L::F64::gather(x, lanes.all_vertices(point));
             }
-            projected[at] = work.project::<L>(declaration, &lanes, (&gradient, &mut hessian), n, &points);
-            if projected[at] != 0 {
-                for (number, slot) in hessian.iter().zip(&mut *slots) {
+            let derivatives = (&gradient[..], &mut hessian[..]);
+            let examined = work.examine::<L>(declaration, &lanes, derivatives, n, &points);
+            projected[at] = examined.changed;
+            if examined.changed != 0 {
+                for (number, slot) in hessian.iter().zip(&mut numbers[..entries]) {
                     number.store(&mut slot[at..]);
                 }
             }
-            at += <L::F64 as Lane<f64>>::LANES;
+            if examined.open != 0 {
+                let vectors = difference_vectors::<L>(declaration, &points);
+                for (number, slot) in vectors.as_flattened().iter().zip(&mut numbers[entries..]) {
+                    number.store(&mut slot[at..]);
+                }
+                open.extend((0..per_batch).filter(|lane| examined.open >> lane & 1 == 1).map(|lane| at + lane));
+            }
         }
+        projection.change_some::<L>(
+            &open,
+            (numbers.as_flattened_mut(), TAPE_BLOCK),
+            |element| element,
+            |element| {
+                projected[element / per_batch * per_batch] |= 1 << (element % per_batch);
+            },
+        );
     }
 }
 

@@ -1,9 +1,8 @@
-use energy_dsl::{BLOCK, Declaration, Lane, Level, Mask, Number, Vector3, triangle_index};
+use energy_dsl::{Declaration, Lane, Level, Mask, Number, Vector3, triangle_index};
 
 use super::pack_energies::PackEnergies;
-use crate::terms::curvature::{
-    Curvature, Hinges, Indefinite, MOST_NUMBERS, Orthonormal, change_dense, is_semi_definite,
-};
+use super::waiting::Waiting;
+use crate::terms::curvature::{Curvature, Hinges, Orthonormal, Projection, change_dense, is_semi_definite};
 use crate::terms::linearisation::Linearisation;
 use crate::terms::places::BlockPlaces;
 use crate::terms::scatter::{Lanes, TriangleBuffer, VectorBuffer, points_of_triangle};
@@ -93,8 +92,7 @@ pub(super) struct Hessians<'a, 'b> {
     orthonormal: Option<&'a Orthonormal>,
     vectors: VectorBuffer,
     triangles: TriangleBuffer,
-    /// Scratch buffer for [`Indefinite`].
-    numbers: Vec<f64>,
+    pub(super) waiting: Waiting,
     energies: PackEnergies<'a>,
     pub(super) flagged: u64,
     pub(super) projected: u64,
@@ -119,7 +117,7 @@ impl<'a, 'b> Hessians<'a, 'b> {
             orthonormal,
             vectors: VectorBuffer::new(arity),
             triangles: TriangleBuffer::new(arity),
-            numbers: vec![0.0; MOST_NUMBERS * BLOCK],
+            waiting: Waiting::default(),
             energies,
             flagged: 0,
             projected: 0,
@@ -127,43 +125,42 @@ impl<'a, 'b> Hessians<'a, 'b> {
     }
 }
 
-impl Hessians<'_, '_> {
-    /// Returns whether Hessians are made positive semi-definite before they are expanded to points.
-    pub(super) fn is_projected(&self) -> bool {
-        self.orthonormal.is_some() && self.sum.curvature != Curvature::Exact
+impl<'a> Hessians<'a, '_> {
+    /// Returns how Hessians are made positive semi-definite before they are expanded to points; `None` if they are not.
+    pub(super) fn projection(&self, declaration: &Declaration) -> Option<Projection<'a>> {
+        let vectors = declaration.reduced_vectors.len();
+        let curvature = self.sum.curvature;
+        let orthonormal = self.orthonormal.filter(|_| curvature != Curvature::Exact)?;
+        let known = if vectors <= 2 { vectors } else { 0 };
+        Some(Projection { curvature, orthonormal, n: 3 * vectors, vectors: known })
     }
 
-    /// Makes the reduced Hessians of all lanes positive semi-definite, if that is asked for. Returns a bit mask of the
-    /// changed lanes.
+    /// Projects Hessians of functions of a dihedral angle, if that is asked for, and looks at those of all lanes.
     #[inline(always)]
-    pub(super) fn project<L: Level>(
-        &mut self,
+    pub(super) fn examine<L: Level>(
+        &self,
         declaration: &Declaration,
         lanes: &Lanes<'_>,
         (gradient, hessian): (&[L::F64], &mut [L::F64]),
         n: usize,
         points: &[Vector3<L::F64>],
-    ) -> u32 {
+    ) -> Examined {
         let curvature = self.sum.curvature;
-        let Some(orthonormal) = self.orthonormal else { return 0 };
-        if curvature == Curvature::Exact {
-            return 0;
+        let mut examined = Examined { open: u32::MAX >> (32 - lanes.count), changed: 0 };
+        if self.orthonormal.is_none() || curvature == Curvature::Exact {
+            return Examined { open: 0, ..examined };
         }
-        let (mut open, mut changed) = (u32::MAX >> (32 - lanes.count), 0);
         if let Some(of) = declaration.dihedral {
             let vectors = hinge_vectors::<L>(of, points);
             let lanes = L::F64::dispatch(Hinges { curvature, vectors, gradient, upper: &mut *hessian });
-            changed = lanes.changed & open;
-            open &= !lanes.treated;
-            if open == 0 {
-                return changed;
+            examined.changed = lanes.changed & examined.open;
+            examined.open &= !lanes.treated;
+            if examined.open == 0 {
+                return examined;
             }
         }
-        open &= (!is_semi_definite(hessian, n)).bits();
-        if open != 0 {
-            changed |= self.change_indefinite::<L>(declaration, orthonormal, hessian, open, points);
-        }
-        changed
+        examined.open &= (!is_semi_definite(hessian, n)).bits();
+        examined
     }
 
     /// Adds the results of all lanes, in terms of points. `projected` marks the changed lanes; `scratch` has two
@@ -192,38 +189,15 @@ impl Hessians<'_, '_> {
         self.flagged += count_owned(flagged, vertices, first, count);
         self.projected += count_owned(projected, vertices, first, count);
     }
+}
 
-    /// Projects the Hessians of the `open` lanes. Returns a bit mask of the changed lanes.
-    #[inline(always)]
-    fn change_indefinite<L: Level>(
-        &mut self,
-        declaration: &Declaration,
-        orthonormal: &Orthonormal,
-        hessian: &mut [L::F64],
-        open: u32,
-        points: &[Vector3<L::F64>],
-    ) -> u32 {
-        let lanes = <L::F64 as Lane<f64>>::LANES;
-        let vectors = declaration.reduced_vectors.len();
-        let known =
-            if vectors <= 2 { difference_vectors::<L>(declaration, points) } else { [[L::F64::splat(0.0); 3]; 2] };
-        for (number, stored) in hessian.iter().chain(known.as_flattened()).zip(self.numbers.chunks_exact_mut(lanes)) {
-            number.store(stored);
-        }
-        let indefinite = Indefinite {
-            n: 3 * vectors,
-            curvature: self.sum.curvature,
-            orthonormal,
-            vectors: if vectors <= 2 { vectors } else { 0 },
-            open,
-            numbers: &mut self.numbers,
-        };
-        let changed = indefinite.change(L::NAME);
-        for (number, stored) in hessian.iter_mut().zip(self.numbers.chunks_exact(lanes)) {
-            *number = L::F64::load(stored);
-        }
-        changed
-    }
+/// What is known of the Hessians in lanes, as bits.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Examined {
+    /// Lanes with an indefinite Hessian.
+    pub(super) open: u32,
+    /// Lanes that were changed.
+    pub(super) changed: u32,
 }
 
 /// Returns the difference vectors x₄ − x₃, x₁ − x₃ and x₂ − x₃ of a hinge.
@@ -238,10 +212,16 @@ fn hinge_vectors<L: Level>([x1, x2, x3, x4]: [usize; 4], points: &[Vector3<L::F6
     vectors
 }
 
-/// Returns the one or two difference vectors of an element.
+/// Returns the one or two difference vectors of an element; zeros if it has more.
 #[inline(always)]
-fn difference_vectors<L: Level>(declaration: &Declaration, points: &[Vector3<L::F64>]) -> [Vector3<L::F64>; 2] {
+pub(super) fn difference_vectors<L: Level>(
+    declaration: &Declaration,
+    points: &[Vector3<L::F64>],
+) -> [Vector3<L::F64>; 2] {
     let mut vectors = [[L::F64::splat(0.0); 3]; 2];
+    if declaration.reduced_vectors.len() > 2 {
+        return vectors;
+    }
     for (vector, terms) in vectors.iter_mut().zip(&*declaration.reduced_vectors) {
         for &(point, added) in &**terms {
             for axis in 0..3 {
@@ -286,7 +266,8 @@ fn subtract_product<V: Lane<f64>>(
     buffer.subtract(lanes, sums, first_vertex, product);
 }
 
-/// Fallback for elements with more coordinates than lanes support. Returns a bit mask of the changed lanes.
+/// Fallback for elements whose coordinates are no independent differences of points. Returns a bit mask of the changed
+/// lanes.
 #[inline(never)]
 fn change_one_by_one<V: Lane<f64>>(triangle: &mut [[Vector3<V>; 3]], count: usize, curvature: Curvature) -> u32 {
     let points = points_of_triangle(triangle.len());
