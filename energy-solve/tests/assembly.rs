@@ -86,7 +86,7 @@ fn matrix_is_the_derivative_of_the_force() {
     }
 }
 
-/// A force law whose Jacobian is not symmetric makes the matrix store both triangles. The blocks of potentials below the
+/// A force law whose Jacobian is not symmetric makes the matrix store both triangles. Blocks of potentials below the
 /// diagonal are then transposes of those above.
 #[test]
 fn potentials_fill_both_triangles_beside_an_unsymmetric_force() {

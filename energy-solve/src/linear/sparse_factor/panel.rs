@@ -184,8 +184,8 @@ fn subtract_outer(target: &mut [f64], target_stride: usize, left: &[f64], stride
     dispatch(OuterProduct { target, target_stride, left, stride, sizes });
 }
 
-/// [`subtract_outer`], in tiles whose sums stay in registers. A strip of rows of A stays in the cache while it meets all
-/// columns.
+/// [`subtract_outer`], in tiles whose sums stay in registers. A strip of rows of A stays in the cache while it meets
+/// all columns.
 struct OuterProduct<'a> {
     target: &'a mut [f64],
     target_stride: usize,
