@@ -58,7 +58,7 @@ mod tests {
     #[test]
     fn hessians_of_lengths_are_recognised_and_projected() {
         let d = [0.3, -1.2, 2.0];
-        for (bend, pull) in [(5.0, 2.0), (5.0, -2.0), (-3.0, 2.0), (-3.0, -2.0)] {
+        for (bend, pull) in [(5.0_f64, 2.0_f64), (5.0, -2.0), (-3.0, 2.0), (-3.0, -2.0)] {
             for (curvature, [bent, pulled]) in
                 [(Curvature::Clamped, [bend.max(0.0), pull.max(0.0)]), (Curvature::Absolute, [bend.abs(), pull.abs()])]
             {
