@@ -36,8 +36,7 @@ enum Command {
     Sweep(cli::sweep::Sweep),
     /// Write report.html of a finished run: picture, energies, times, evaluation counts, audit of its elements.
     Report(cli::report::Report),
-    /// Show a scene while it is simulated, or play a run, in a window (needs a build with `--features view`);
-    /// `--screenshot` works in every build.
+    /// Write a picture of a scene or a run, without a display (`--screenshot`). `cloth-window` shows them in a window.
     View(cli::view::View),
     /// Print the JSON schema of scene files, for editors.
     Schema,

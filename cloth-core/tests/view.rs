@@ -87,19 +87,7 @@ fn a_screenshot_of_a_scene_equals_that_of_its_run() {
 fn invalid_requests_are_clear_errors() {
     let folder = with_scene();
     let path = folder.path();
-    assert!(refused(&["view", "nothing.toml"], path).contains(if cfg!(feature = "view") {
-        "cannot read the scene nothing.toml"
-    } else {
-        "cargo build --release -p cloth-core --features view"
-    }));
-    #[cfg(all(feature = "view", target_os = "linux"))]
-    {
-        assert!(refused(&["view", "scene.toml"], path).contains("no display"));
-        let mut command = Command::new(env!("CARGO_BIN_EXE_cloth"));
-        command.args(["view", "scene.toml"]).current_dir(path).env("DISPLAY", ":nobody").env_remove("WAYLAND_DISPLAY");
-        let message = String::from_utf8(command.output().unwrap().stderr).unwrap();
-        assert!(message.contains("cannot open a window: ") && !message.contains("panicked"), "{message}");
-    }
+    assert!(refused(&["view", "scene.toml"], path).contains("cloth-core/window/Cargo.toml -- scene.toml"));
     let shot = |shown: &str, more: &[&str]| refused(&[&["view", shown, "--screenshot", "x.png"], more].concat(), path);
     assert!(shot("nothing.toml", &[]).contains("cannot read the scene nothing.toml"));
     std::fs::create_dir(path.join("empty")).unwrap();

@@ -17,8 +17,7 @@
 //! * [`OverRelaxation`] is the fastest for the few digits that Newton's method needs.
 //! * [`Multigrid`] replaces it for meshes so fine or stiff that it takes too many iterations.
 //! * [`BlockCholesky`] solves to full precision.
-//! * [`conjugate_gradients`] and [`bicgstab`] take a [`Preconditioner`]. BiCGSTAB also solves systems that are not
-//!   symmetric.
+//! * [`bicgstab`] solves systems that are not symmetric.
 //!
 //! Potentials are evaluated in SIMD lanes and by several threads ([`System::set_threads`],
 //! [`OverRelaxation::with_threads`], [`Multigrid::with_threads`]). Everything is deterministic: sums run in the order
@@ -32,17 +31,17 @@
 //! A [`GaussNewton`] solver minimises sums of squared residuals ([`ResidualTerm`]) over blocks of unknowns.
 //!
 //! ```
-//! use energy_solve::{BlockJacobi, BlockMatrix, Pattern, SolveOptions, Storage, conjugate_gradients};
+//! use energy_solve::{BlockMatrix, OverRelaxation, Pattern, SolveOptions, Storage};
 //!
 //! // One vertex held by springs of 2, 4 and 8 N/m along the axes, pulled with 1 N along each axis.
 //! let mut matrix = BlockMatrix::zeros(Pattern::from_stencils(Storage::Upper, 1, []).into());
 //! for (axis, stiffness) in [2.0, 4.0, 8.0].into_iter().enumerate() {
 //!     matrix.diagonal_mut(0)[axis][axis] = stiffness;
 //! }
-//! let preconditioner = BlockJacobi::new(&matrix).unwrap();
+//! let mut solver = OverRelaxation::<f64>::new(matrix.pattern());
+//! solver.scale(&matrix).unwrap();
 //! let mut displacement = vec![[0.0; 3]];
-//! let report =
-//!     conjugate_gradients(&matrix, &preconditioner, &[[1.0; 3]], &mut displacement, &SolveOptions::default());
+//! let report = solver.solve(&[[1.0; 3]], &mut displacement, &SolveOptions::default());
 //! assert!(report.converged());
 //! assert!((displacement[0][2] - 0.125).abs() < 1e-12);
 //! ```
@@ -60,12 +59,12 @@ pub mod threads;
 pub use contact::{Contact, ContactCounts, ContactMemory, ContactModel, ContactsInMatrix, Pressed, Presser, Touching};
 pub use least_squares::{
     CouplingError, Couplings, GaussNewton, GaussNewtonError, GaussNewtonOptions, IterationReport, LeastSquaresTerm,
-    Loss, NormalEquations, NormalMatrix, NormalPattern, NormalSolution, NormalSolver, NormalSolverKind, Outcome,
-    Placed, ResidualTerm, SolverError, TermCost, TermSum,
+    Loss, NormalEquations, NormalMatrix, NormalSolverKind, Outcome, Placed, ResidualTerm, SolverError, TermCost,
+    TermSum,
 };
 pub use linear::{
-    BlockCholesky, BlockJacobi, CholeskyError, IncompleteCholesky, Multigrid, OverRelaxation, Preconditioner,
-    SingularBlock, SolveOptions, SolveReport, StopReason, bicgstab, conjugate_gradients,
+    BlockCholesky, CholeskyError, Multigrid, OverRelaxation, SingularBlock, SolveOptions, SolveReport, StopReason,
+    bicgstab,
 };
 pub use matrix::{BlockMatrix, Blocks, Bsr, Csr, DofMap, Pattern, Precision, Storage, dot, index};
 pub use system::{EvaluationError, LinearisationOptions, LinearisedForces, System, SystemError, TermEnergy};

@@ -2,6 +2,7 @@
 
 use crate::elements::{AnySpring, Damper, Spring};
 use energy_dsl::Vector3;
+use energy_elements::{BridsonForce, StVK};
 use energy_solve::{
     BlockMatrix, Curvature, ElementList, EvaluationError, ForceTerm, LinearisationOptions, ListError, PotentialTerm,
     Quantity, State, StepStart, System, SystemError, Term, Weights,
@@ -83,6 +84,40 @@ fn matrix_is_the_derivative_of_the_force() {
             }
         }
     }
+}
+
+/// A force law whose Jacobian is not symmetric makes the matrix store both triangles. Blocks of potentials below the
+/// diagonal are then transposes of those above.
+#[test]
+fn potentials_fill_both_triangles_beside_an_unsymmetric_force() {
+    let triangles = [[2, 0, 3], [1, 3, 2]];
+    let rest = [[[0.0, 0.0], [1.0, 0.1], [0.2, 1.1]], [[0.0, 0.0], [0.9, 0.0], [0.3, 1.0]]];
+    let membranes = rest.map(|[a, b, c]| StVK::new(a, b, c, 3.0, 5.0).unwrap()).to_vec();
+    let membrane = PotentialTerm::new(ElementList::new("membrane", membranes, &triangles).unwrap());
+    let bending = ElementList::new("bending", vec![BridsonForce::new(2.0, 0.3)], &[[0, 1, 2, 3]]).unwrap();
+    let mut system = System::new(vec![Box::new(membrane), Box::new(ForceTerm::new(bending))], &[false; 4]).unwrap();
+    let x = [[1.1, 0.2, 0.3], [-0.2, 0.9, -0.1], [0.1, 0.0, 0.2], [0.3, 1.2, -0.2]];
+    let still = [[0.0; 3]; 4];
+    let mut matrix = system.matrix();
+    let weights = Weights { position: 1.0, velocity: 0.0 };
+    system.linearise(State { x: &x, v: &still }, options(weights, Curvature::Exact), &mut matrix).unwrap();
+    let mut asymmetry = 0.0_f64;
+    for (column, axis) in (0..4).flat_map(|column| (0..3).map(move |axis| (column, axis))) {
+        let mut forces = |step: f64| {
+            let mut moved = x;
+            moved[column][axis] += step;
+            system.forces(State { x: &moved, v: &still }).unwrap()
+        };
+        let (after, before) = (forces(1e-5), forces(-1e-5));
+        for (row, component) in (0..4).flat_map(|row| (0..3).map(move |component| (row, component))) {
+            let expected = (after[row][component] - before[row][component]) / 2e-5;
+            let (got, mirrored) =
+                (matrix.block(row, column)[component][axis], matrix.block(column, row)[axis][component]);
+            assert!((got - expected).abs() < 1e-6, "block ({row}, {column}), entry ({component}, {axis}): {got}");
+            asymmetry = asymmetry.max((got - mirrored).abs());
+        }
+    }
+    assert!(asymmetry > 0.1, "the Jacobian is symmetric to {asymmetry:e}");
 }
 
 #[test]

@@ -8,8 +8,7 @@ use energy_dsl::tape::Column;
 use energy_dsl::{Element, energy};
 use energy_solve::{
     Couplings, Curvature, ElementList, EvaluationError, GaussNewton, GaussNewtonOptions, LeastSquaresTerm,
-    LinearisationOptions, NormalPattern, Placed, PotentialTerm, Quantity, ResidualTerm, State, System, TapeTerm, Term,
-    Weights,
+    LinearisationOptions, Placed, PotentialTerm, Quantity, ResidualTerm, State, System, TapeTerm, Term, Weights,
 };
 
 energy! {
@@ -66,7 +65,7 @@ fn sums_are_infinite_and_their_derivatives_are_refused() {
 
 #[test]
 fn least_squares_never_step_outside() {
-    let pattern = Arc::new(NormalPattern::new(1, [[0].as_slice()]).unwrap());
+    let pattern = Arc::new(Couplings::pattern(1, [[0].as_slice()]).unwrap());
     let couplings = Arc::new(Couplings::new(&pattern, &[[0]]).unwrap());
     let mut roots = ResidualTerm::<Root, 2>::new("roots", couplings, 1.0);
     roots.set_elements([Placed { element: Root::new(), stencil: 0, weight: 1.0 }]);

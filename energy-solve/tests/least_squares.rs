@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use energy_dsl::energy;
 use energy_solve::{
-    Couplings, GaussNewton, GaussNewtonError, GaussNewtonOptions, LeastSquaresTerm, Loss, NormalPattern,
-    NormalSolverKind, Outcome, Placed, ResidualTerm,
+    Couplings, GaussNewton, GaussNewtonError, GaussNewtonOptions, LeastSquaresTerm, Loss, NormalSolverKind, Outcome,
+    Pattern, Placed, ResidualTerm,
 };
 
 energy! {
@@ -13,12 +13,15 @@ energy! {
     residual Link(a, b: Vec2; L: Scalar) { [norm(b - a) - L, sin(a.x) * b.y, a.y - b.x^2] }
 
     residual Anchor(a: Vec2; x: Vec2) { a - x }
+
+    /// Two rows that are linear in both points.
+    residual Offset(a, b: Vec2; d: Vec2) { [a.x - 2 * b.y - d.x, a.y + b.x - d.y] }
 }
 
 /// A chain of blocks with links in both directions, so that some blocks are stored transposed. The number of links
 /// leaves lanes unused.
 struct Chain {
-    pattern: Arc<NormalPattern>,
+    pattern: Arc<Pattern>,
     links: ResidualTerm<Link, 2>,
     anchors: ResidualTerm<Anchor, 2>,
     x: Vec<[f64; 2]>,
@@ -27,7 +30,7 @@ struct Chain {
 fn chain(blocks: u32, loss: Loss) -> Chain {
     let stencils: Vec<[u32; 2]> =
         (1..blocks).map(|i| if i % 3 == 0 { [i, i - 1] } else { [i - 1, i] }).chain([[blocks - 1, 0]]).collect();
-    let pattern = Arc::new(NormalPattern::new(blocks as usize, stencils.iter().map(<[u32; 2]>::as_slice)).unwrap());
+    let pattern = Arc::new(Couplings::pattern(blocks as usize, stencils.iter().map(<[u32; 2]>::as_slice)).unwrap());
     let couplings = Arc::new(Couplings::new(&pattern, &stencils).unwrap());
     let mut links = ResidualTerm::new("links", couplings, 0.7);
     links.loss = loss;
@@ -109,8 +112,30 @@ fn iterations_decrease_the_energy_to_a_minimum() {
 }
 
 #[test]
+fn the_predicted_decrease_of_linear_residuals_is_the_decrease() {
+    let pattern = Arc::new(Couplings::pattern(2, [[0, 1].as_slice()]).unwrap());
+    // The second block comes first in one of the elements.
+    let couplings = Arc::new(Couplings::new(&pattern, &[[0, 1], [1, 0]]).unwrap());
+    let mut offsets = ResidualTerm::<Offset, 2>::new("offsets", couplings, 0.7);
+    offsets.set_elements((0..2).map(|stencil| {
+        let element = Offset::new([0.5, 2.0 - f64::from(stencil)]);
+        Placed { element, stencil, weight: 1.0 + f64::from(stencil) }
+    }));
+    let terms: [&dyn LeastSquaresTerm<2>; 1] = [&offsets];
+    let mut solver = GaussNewton::new(pattern, GaussNewtonOptions::default()).unwrap();
+    let x = [[1.0, -0.5], [0.3, 2.0]];
+    solver.linearise(&terms, &x).unwrap();
+    for step in [[[0.1, 0.2], [-0.4, 0.3]], [[-3.0, 0.5], [2.0, 1.0]]] {
+        let moved: [[f64; 2]; 2] = std::array::from_fn(|block| std::array::from_fn(|i| x[block][i] + step[block][i]));
+        let decrease = offsets.energy(&x).energy - offsets.energy(&moved).energy;
+        let predicted = solver.predicted_decrease(&step);
+        assert!((predicted - decrease).abs() < 1e-12 * decrease.abs(), "{predicted}, {decrease}");
+    }
+}
+
+#[test]
 fn a_graph_alone_is_singular_and_needs_damping() {
-    let pattern = Arc::new(NormalPattern::new(2, [[0, 1].as_slice()]).unwrap());
+    let pattern = Arc::new(Couplings::pattern(2, [[0, 1].as_slice()]).unwrap());
     let mut links = ResidualTerm::<Link, 2>::new("links", Arc::new(Couplings::new(&pattern, &[[0, 1]]).unwrap()), 1.0);
     links.set_elements([Placed { element: Link::new(1.0), stencil: 0, weight: 1.0 }]);
     // Three rows for four unknowns: there is no factor without damping, so the iteration must increase it.

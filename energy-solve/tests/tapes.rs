@@ -242,3 +242,28 @@ fn own_laws_and_steered_tapes_sum_as_declared_elements_do() {
         }
     }
 }
+
+#[test]
+fn hessians_of_own_laws_are_projected() {
+    let vertices: Vec<u32> = vec![0, 1, 1, 2, 2, 4, 4, 0];
+    let of = |stiffness: [f64; 4], curvature: Curvature| {
+        let own = OwnTerm::new("own".to_owned(), OwnSprings(stiffness.to_vec()), vertices.clone());
+        summed(Box::new(own), curvature).2
+    };
+    let total = |list: &[(usize, usize, f64)], at: (usize, usize)| -> f64 {
+        list.iter().filter(|e| (e.0, e.1) == at).map(|e| e.2).sum()
+    };
+    // Two of the springs push. Absolute eigenvalues turn them into springs that pull; clamped ones leave them out.
+    let mixed = [1.0, -2.0, 3.0, -4.0];
+    for (curvature, equal) in [
+        (Curvature::Absolute, [1.0, 2.0, 3.0, 4.0]),
+        (Curvature::Clamped, [1.0, 0.0, 3.0, 0.0]),
+        (Curvature::Exact, mixed),
+    ] {
+        let (found, expected) = (of(mixed, curvature), of(equal, Curvature::Exact));
+        for at in (0..12).flat_map(|row| (0..12).map(move |column| (row, column))) {
+            let [found, expected] = [total(&found, at), total(&expected, at)];
+            assert!((found - expected).abs() < 1e-13, "{curvature:?}, entry {at:?}: {found}, expected {expected}");
+        }
+    }
+}

@@ -100,7 +100,7 @@ fn measure(vertices: usize, nodes: usize, k: usize) {
         "\n{} nodes, {} pairs, K = {k}, KG = 8: {} blocks of JᵀJ stored",
         model.nodes.len(),
         pairs.len(),
-        energy.pattern().stored()
+        energy.pattern().blocks()
     );
     println!("  filling the data term             {filling:8.2} ms, after each search for correspondences");
     println!("  derivatives                       {derivatives:8.2} ms");

@@ -193,7 +193,7 @@ fn bones_as_unknowns_add_their_blocks() {
     let known = FusionEnergy::new(&model, EnergyOptions::default()).unwrap();
     let options = EnergyOptions { bones: BoneMode::Unknown, ..EnergyOptions::default() };
     let unknown = FusionEnergy::new(&model, options).unwrap();
-    assert_eq!(unknown.pattern().blocks(), known.pattern().blocks() + 16);
+    assert_eq!(unknown.pattern().rows(), known.pattern().rows() + 16);
     let names: Vec<&str> = unknown.terms().iter().map(|term| term.name()).collect();
     assert_eq!(names, ["nonrigid", "graph", "skeleton", "binding", "prior", "joints"]);
 }

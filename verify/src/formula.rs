@@ -4,7 +4,6 @@ use energy_compiler::Textbook;
 use energy_dsl::{Declaration, Inputs, Kind, Number};
 
 use crate::blocks::{Block, BlockName};
-use crate::dual::Hyper;
 use crate::jet::{Jet, Order};
 use crate::sample::Sample;
 
@@ -25,9 +24,9 @@ pub fn rows(formula: &Textbook, sample: &Sample) -> Vec<f64> {
     formula.evaluate(&sample.inputs())
 }
 
-/// Computes every block of a declaration from its formula alone, by hyper-dual numbers.
+/// Computes every block of a declaration from its formula alone, by dual numbers in double precision.
 pub fn expected_blocks(declaration: &Declaration, formula: &Textbook, sample: &Sample) -> Vec<Block> {
-    blocks(declaration.kind, expand(formula, sample, order(declaration.kind) == Order::Second), sample)
+    blocks_over(declaration, formula, sample)
 }
 
 /// Computes every block over any number type, by jets. Creates the numbers itself, so that they have the caller's
@@ -184,46 +183,4 @@ fn expand_by_jets<T: Number<Mask = bool>>(
         by_velocity: rows.iter().map(|r| row(r, n..n + m)).collect(),
         values: rows.into_iter().map(|r| r.value).collect(),
     }
-}
-
-/// Evaluates once per pair of coordinates by hyper-dual numbers; once per coordinate if no second derivatives are
-/// needed.
-fn expand(formula: &Textbook, sample: &Sample, second: bool) -> Expansion<f64> {
-    let n = sample.positions.len();
-    let values = rows(formula, sample);
-    let mut by_position = vec![vec![0.0; n]; values.len()];
-    let mut by_position_twice = vec![vec![vec![0.0; n]; n]; if second { values.len() } else { 0 }];
-    for i in 0..n {
-        for j in if second { i..n } else { i..i + 1 } {
-            for (r, row) in evaluate_hyper(formula, sample, (i, j), None).iter().enumerate() {
-                if second {
-                    by_position_twice[r][i][j] = row.0.eps1eps2;
-                    by_position_twice[r][j][i] = row.0.eps1eps2;
-                }
-                by_position[r][i] = row.0.eps1;
-            }
-        }
-    }
-    let mut by_velocity = vec![vec![0.0; sample.velocities.len()]; values.len()];
-    for i in 0..sample.velocities.len() {
-        for (r, row) in evaluate_hyper(formula, sample, (n, n), Some(i)).iter().enumerate() {
-            by_velocity[r][i] = row.0.eps1;
-        }
-    }
-    Expansion { values, by_position, by_position_twice, by_velocity }
-}
-
-/// Evaluates the rows with ε₁ along position `i` and ε₂ along `j`, or with ε₁ along one velocity.
-fn evaluate_hyper(formula: &Textbook, sample: &Sample, (i, j): (usize, usize), velocity: Option<usize>) -> Vec<Hyper> {
-    let constants = |numbers: &[f64]| numbers.iter().map(|&x| Hyper::constant(x)).collect::<Vec<_>>();
-    let positions: Vec<Hyper> =
-        sample.positions.iter().enumerate().map(|(at, &x)| Hyper::variable(x, at == i, at == j)).collect();
-    let velocities: Vec<Hyper> =
-        sample.velocities.iter().enumerate().map(|(at, &v)| Hyper::variable(v, Some(at) == velocity, false)).collect();
-    formula.evaluate(&Inputs {
-        parameters: &constants(&sample.parameters),
-        rest: &constants(&sample.rest),
-        positions: &positions,
-        velocities: &velocities,
-    })
 }

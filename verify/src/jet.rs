@@ -1,3 +1,5 @@
+//! Forward differentiation in all coordinates at once, over any number type.
+
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
 use energy_dsl::{Level, Number};
@@ -5,8 +7,9 @@ use energy_dsl::{Level, Number};
 /// A number with its first and second derivatives by all coordinates. Missing derivatives and `None` are identically
 /// zero.
 #[derive(Clone, Debug)]
-pub(crate) struct Jet<T> {
-    pub(crate) value: T,
+pub struct Jet<T> {
+    /// The value.
+    pub value: T,
     first: Vec<Option<T>>,
     /// Upper triangle of second derivatives, row by row; empty if not requested.
     second: Vec<Option<T>>,
@@ -14,18 +17,21 @@ pub(crate) struct Jet<T> {
 
 /// The order of differentiation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Order {
+pub enum Order {
+    /// First derivatives.
     First,
+    /// First and second derivatives.
     Second,
 }
 
 impl<T: Number> Jet<T> {
-    pub(crate) fn constant(value: T) -> Self {
+    /// Creates a constant.
+    pub fn constant(value: T) -> Self {
         Self { value, first: Vec::new(), second: Vec::new() }
     }
 
     /// Creates the variable for coordinate `number` of `count`.
-    pub(crate) fn variable(value: T, number: usize, count: usize, order: Order) -> Self {
+    pub fn variable(value: T, number: usize, count: usize, order: Order) -> Self {
         let mut first = vec![None; count];
         first[number] = Some(T::from_f64(1.0));
         let second = if order == Order::Second { vec![None; count * (count + 1) / 2] } else { Vec::new() };
@@ -33,17 +39,17 @@ impl<T: Number> Jet<T> {
     }
 
     /// Returns the number of coordinates; 0 for a constant.
-    pub(crate) fn coordinates(&self) -> usize {
+    pub fn coordinates(&self) -> usize {
         self.first.len()
     }
 
     /// Returns ∂/∂qᵢ.
-    pub(crate) fn by(&self, i: usize) -> T {
+    pub fn by(&self, i: usize) -> T {
         or_zero(self.first.get(i).and_then(Option::as_ref))
     }
 
     /// Returns ∂²/∂qᵢ∂qⱼ.
-    pub(crate) fn by_both(&self, i: usize, j: usize) -> T {
+    pub fn by_both(&self, i: usize, j: usize) -> T {
         let (i, j) = if i <= j { (i, j) } else { (j, i) };
         let n = self.first.len();
         // The index is i n − i (i + 1)/2 + j, non-negative for i ≤ n. A constant has no derivatives.

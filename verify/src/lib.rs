@@ -3,7 +3,7 @@
 //! Three independent routes check each block that an element returns:
 //!
 //! * multi-precision numbers through the declaration's *textbook* form ([`multiprecision`]),
-//! * hyper-dual numbers through the same form ([`dual::Hyper`]), and
+//! * dual numbers in double precision through the same form ([`jet::Jet`]), and
 //! * finite differences of the block one order below, at the step where they vary least.
 //!
 //! If routes disagree, the audit names the one to suspect. It also checks the laws that a declaration implies, and
@@ -19,12 +19,11 @@
 
 pub mod audit;
 pub mod blocks;
-pub mod dual;
 mod eigenvalues;
 mod finite_difference;
 pub mod formula;
 pub mod geometry;
-mod jet;
+pub mod jet;
 pub mod multiprecision;
 pub mod parallel;
 pub mod sample;

@@ -4,6 +4,7 @@
 mod accuracy;
 mod broken_elements;
 mod claims;
+mod dual;
 mod elementary_functions;
 mod foreign_potentials;
 mod functions;

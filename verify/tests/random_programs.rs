@@ -6,8 +6,9 @@
 use energy_compiler::{Interpreted, Listing, Path, Textbook};
 use energy_dsl::Inputs;
 use proptest::prelude::*;
-use verify::dual::Hyper;
 use verify::{Sample, multiprecision};
+
+use super::dual::Hyper;
 
 /// Three points, two scalars and a vector.
 const SIGNATURE: &str = "p, q, r: Point; k, L: Scalar, u: Vec3";

@@ -81,7 +81,7 @@ pub(super) struct File {
     #[serde(default)]
     untangle: bool,
     /// Linear solver of implicit integrators, for symmetric systems: `auto` (the default), `over-relaxation`,
-    /// `multigrid`, `cholesky` or `incomplete-cholesky`.
+    /// `multigrid` or `cholesky`.
     #[serde(default)]
     linear_solver: LinearSolverChoice,
     /// Retry a failed step with half its size, and so on. Default false.

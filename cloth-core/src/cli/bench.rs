@@ -31,7 +31,7 @@ pub struct Bench {
         value_parser = clap::value_parser!(u16).range(1..),
     )]
     threads: Vec<u16>,
-    /// Linear solvers: `auto`, `over-relaxation`, `multigrid`, `cholesky`, `incomplete-cholesky`.
+    /// Linear solvers: `auto`, `over-relaxation`, `multigrid`, `cholesky`.
     #[arg(long, value_delimiter = ',', default_value = "auto", value_parser = solver_by_name)]
     solver: Vec<LinearSolverChoice>,
     /// Contact of the cloth with itself: `off`, `on`. Cotton touches nothing, so the difference is what searches cost.

@@ -14,15 +14,15 @@ use super::print;
 pub struct View {
     /// Scene file, or folder of a run.
     shown: PathBuf,
-    /// Quantity shown by the colours; the key c changes it.
+    /// Quantity shown by the colours.
     #[arg(long, value_enum, default_value_t)]
     colours: Colouring,
-    /// Draw the edges of triangles; the key w changes it.
+    /// Draw the edges of triangles.
     #[arg(long)]
     wireframe: bool,
     #[command(flatten)]
     allowed: AllowedFolders,
-    /// Write a picture to this PNG file instead of opening a window.
+    /// Write a picture to this PNG file.
     #[arg(long, value_name = "FILE.png", value_parser = png_file)]
     screenshot: Option<PathBuf>,
     /// With --screenshot: the frame to draw, from 0; default: the last.
@@ -37,7 +37,11 @@ impl View {
     pub fn run(&self) -> Result<()> {
         match &self.screenshot {
             Some(file) => self.write_screenshot(file),
-            None => self.open_window(),
+            None => anyhow::bail!(
+                "the window is a program of its own: `cargo run --release --manifest-path cloth-core/window/Cargo.toml \
+                 -- {}`; or write a picture with --screenshot FILE.png",
+                self.shown.display()
+            ),
         }
     }
 
@@ -48,20 +52,6 @@ impl View {
         }
         let record = Record::read(&self.shown)?;
         self.allowed.check(&record.scene, &record.path)
-    }
-
-    #[cfg(feature = "view")]
-    fn open_window(&self) -> Result<()> {
-        self.check_paths()?;
-        Ok(view::open_window(&self.shown, self.colours, self.wireframe)?)
-    }
-
-    #[cfg(not(feature = "view"))]
-    fn open_window(&self) -> Result<()> {
-        anyhow::bail!(
-            "this build has no window; build one with `cargo build --release -p cloth-core --features view`, or write \
-             a picture with --screenshot FILE.png"
-        )
     }
 
     fn write_screenshot(&self, file: &Path) -> Result<()> {

@@ -62,7 +62,7 @@ impl Cantilever {
             [reach + origin, p[1], -drop]
         });
         let weight = self.aspect;
-        let found = Equilibrium::find(system, start.collect(), garment.masses, weight, |vertex| rest[vertex][0])?;
+        let found = Equilibrium::find(system, start.collect(), garment.masses, weight)?;
         let tip: Vec<&[f64; 3]> =
             rest.iter().zip(&found.x).filter(|(p, _)| p[0] > strip.length - 1e-9).map(|(_, x)| x).collect();
         let mean = |axis: usize| tip.iter().map(|x| x[axis]).sum::<f64>() / tip.len() as f64;

@@ -32,7 +32,7 @@ fn sag(span: f64, segments: usize) -> Result<f64, ValidateError> {
         let s = p[0] - 0.5;
         [a * (s / a).asinh(), p[1], a.hypot(s) - top]
     });
-    let found = Equilibrium::find(system, start.collect(), garment.masses, strip.width, |vertex| rest[vertex][0])?;
+    let found = Equilibrium::find(system, start.collect(), garment.masses, strip.width)?;
     Ok(-found.x.iter().map(|x| x[2]).fold(0.0, f64::min))
 }
 

@@ -1,8 +1,7 @@
 use energy_dsl::Vector3;
-use energy_solve::{BlockMatrix, Curvature, LinearisationOptions, State, System, Weights, dot};
+use energy_solve::{BlockCholesky, BlockMatrix, Curvature, LinearisationOptions, State, System, Weights, dot};
 
 use super::ValidateError;
-use super::banded::Banded;
 use crate::integrator::if_finite;
 
 /// A cloth in static equilibrium.
@@ -14,10 +13,9 @@ pub(super) struct Equilibrium {
     pub x: Vec<Vector3<f64>>,
     /// Masses, in kg.
     pub masses: Vec<f64>,
-    /// Free block rows, in an order in which they couple to nearby rows only.
-    order: Vec<usize>,
     /// ∂²U/∂x² at the equilibrium.
     matrix: BlockMatrix,
+    cholesky: BlockCholesky,
 }
 
 /// Newton iterations before the search fails.
@@ -33,20 +31,17 @@ const STRIDE: f64 = 0.1;
 
 impl Equilibrium {
     /// Finds an equilibrium near `start`: Newton's method on the energy, with a direct solver and a line search. Uses
-    /// the exact Hessian if it is positive definite, otherwise clamps each element's. `along` is the long direction of
-    /// the mesh.
+    /// the exact Hessian if it is positive definite, otherwise clamps each element's.
     pub fn find(
         system: System,
         start: Vec<Vector3<f64>>,
         masses: Vec<f64>,
         weight: f64,
-        along: impl Fn(usize) -> f64,
     ) -> Result<Self, ValidateError> {
         let free = system.dofs().free().to_vec();
-        let mut order: Vec<usize> = (0..free.len()).collect();
-        order.sort_by(|&a, &b| along(free[a]).total_cmp(&along(free[b])));
         let matrix = system.matrix();
-        let mut found = Self { matrix, system, x: start, masses, order };
+        let cholesky = BlockCholesky::new(matrix.pattern())?;
+        let mut found = Self { matrix, cholesky, system, x: start, masses };
         let size = extent(&found.x);
         let mut energy = found.energy(&found.x.clone())?;
         let mut force = f64::INFINITY;
@@ -104,17 +99,15 @@ impl Equilibrium {
 
     /// Returns a descent direction.
     fn direction(&mut self, down: &[Vector3<f64>]) -> Result<Vec<Vector3<f64>>, ValidateError> {
-        if let Some(factor) = self.factor(0.0) {
-            return Ok(factor.solve(down));
+        if self.factor(0.0) {
+            return Ok(self.solve(down));
         }
         self.linearise(Curvature::Clamped)?;
         let mut shift = 1e-9 * self.stiffest();
-        loop {
-            if let Some(factor) = self.factor(shift) {
-                return Ok(factor.solve(down));
-            }
+        while !self.factor(shift) {
             shift *= 100.0;
         }
+        Ok(self.solve(down))
     }
 
     /// Returns the largest stiffness over mass.
@@ -124,15 +117,27 @@ impl Equilibrium {
         free.iter().enumerate().map(one).fold(0.0, f64::max)
     }
 
-    /// Factors the Hessian + `shift` M; `None` if the sum is not positive definite.
-    pub fn factor(&self, shift: f64) -> Option<Banded> {
-        let masses: Vec<f64> = self.system.dofs().free().iter().map(|&vertex| self.masses[vertex]).collect();
-        Banded::factor(&self.matrix, &self.order, &masses, shift)
+    /// Factors the Hessian + `shift` M; `false` if the sum is not positive definite.
+    pub fn factor(&mut self, shift: f64) -> bool {
+        let mut sum = self.matrix.clone();
+        for (row, &vertex) in self.system.dofs().free().iter().enumerate() {
+            (0..3).for_each(|axis| sum.diagonal_mut(row)[axis][axis] += shift * self.masses[vertex]);
+        }
+        self.cholesky.factor(&sum).is_ok()
+    }
+
+    /// Returns A⁻¹ b for the last factored sum A.
+    fn solve(&self, b: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
+        let mut x = vec![[0.0; 3]; b.len()];
+        self.cholesky.solve(b, &mut x);
+        x
     }
 
     /// Returns the smallest ω² of small motions about the equilibrium, by inverse iteration; `None` if it is unstable.
-    pub fn lowest_mode(&self) -> Option<f64> {
-        let factor = self.factor(0.0)?;
+    pub fn lowest_mode(&mut self) -> Option<f64> {
+        if !self.factor(0.0) {
+            return None;
+        }
         let free = self.system.dofs().free();
         let masses: Vec<f64> = free.iter().map(|&vertex| self.masses[vertex]).collect();
         // Any start vector that is not orthogonal to the mode.
@@ -141,7 +146,7 @@ impl Equilibrium {
         let mut omega_squared = f64::INFINITY;
         for _ in 0..2000 {
             let right: Vec<Vector3<f64>> = u.iter().zip(&masses).map(|(u, m)| u.map(|c| m * c)).collect();
-            let next = factor.solve(&right);
+            let next = self.solve(&right);
             let heavy: Vec<Vector3<f64>> = next.iter().zip(&masses).map(|(u, m)| u.map(|c| m * c)).collect();
             let (squared, mixed) = (dot(&next, &heavy), dot(&next, &right));
             let before = omega_squared;

@@ -66,7 +66,7 @@ impl LateralBuckling {
         let clamped: Vec<bool> = rest.iter().map(|p| p[0] < 1.2 * spacing).collect();
         let system = System::new(garment.terms, &clamped)?;
         let start = rest.to_vec();
-        let found = Equilibrium::find(system, start, garment.masses, self.aspect, |vertex| rest[vertex][0])?;
+        let mut found = Equilibrium::find(system, start, garment.masses, self.aspect)?;
         Ok(found.lowest_mode().map(|squared| gamma * squared))
     }
 

@@ -58,8 +58,7 @@ fn energies(scheme: &mut dyn Integrator, body: &mut Body, dt: f64, steps: usize)
 /// Returns the energy of the nearest equilibrium, in J.
 fn rest(body: Body) -> Result<f64, ValidateError> {
     let weight = GRAVITY * body.masses.iter().sum::<f64>();
-    let heights: Vec<f64> = body.x.iter().map(|x| x[2]).collect();
-    let mut rest = Equilibrium::find(body.system, body.x, body.masses, weight, |vertex| heights[vertex])?;
+    let mut rest = Equilibrium::find(body.system, body.x, body.masses, weight)?;
     Ok(rest.system.energies(&rest.x)?.iter().filter_map(|term| term.energy).sum())
 }
 

@@ -3,7 +3,6 @@
 //! One file per question. Static shapes are computed by Newton's method on the energy, with a direct solver; motions
 //! are simulated.
 
-mod banded;
 mod cantilever;
 mod capstan;
 mod catenary;
@@ -28,7 +27,7 @@ mod stick_slip;
 mod strip;
 mod thinner;
 
-use energy_solve::{EvaluationError, ListError, SystemError};
+use energy_solve::{CholeskyError, EvaluationError, ListError, SystemError};
 
 pub use cantilever::Cantilever;
 pub use elastica::Elastica;
@@ -96,6 +95,9 @@ pub enum ValidateError {
     /// Forces or energies cannot be evaluated.
     #[error(transparent)]
     Evaluation(#[from] EvaluationError),
+    /// A Hessian cannot be factored.
+    #[error(transparent)]
+    Factor(#[from] CholeskyError),
     /// A step failed.
     #[error(transparent)]
     Step(#[from] StepError),

@@ -34,7 +34,7 @@ fn chain(links: usize) -> Result<f64, ValidateError> {
         &held,
     )?;
     let start = (0..=links).map(|vertex| [0.0, 0.0, -(vertex as f64) / n]).collect();
-    let found = Equilibrium::find(system, start, vec![mass; links + 1], 1.0, |vertex| vertex as f64)?;
+    let mut found = Equilibrium::find(system, start, vec![mass; links + 1], 1.0)?;
     Ok(found.lowest_mode().unwrap_or(f64::NAN).sqrt())
 }
 
@@ -55,7 +55,7 @@ fn strip(bending: Bending, gravity: f64, clamped: bool, segments: usize) -> Resu
     let held: Vec<bool> = rest.iter().map(|p| p[0] < reach).collect();
     let system = System::new(garment.terms, &held)?;
     let start = rest.iter().map(|p| [p[0] + gravity / MEMBRANE * p[0] * (1.0 - 0.5 * p[0]), p[1], 0.0]).collect();
-    let found = Equilibrium::find(system, start, garment.masses, width, |vertex| rest[vertex][0])?;
+    let mut found = Equilibrium::find(system, start, garment.masses, width)?;
     Ok(found.lowest_mode().map(f64::sqrt))
 }
 

@@ -1,4 +1,4 @@
-//! Views of scenes and finished runs: everything of `cloth view` except the window, which needs the feature `view`.
+//! Views of scenes and finished runs: everything of the program `cloth-window` except the window itself.
 //!
 //! - [`Stage`] holds the content and advances time.
 //! - [`Orbit`] is the camera.
@@ -13,8 +13,6 @@ mod picking;
 mod screenshot;
 mod stage;
 mod viewer;
-#[cfg(feature = "view")]
-mod window;
 
 pub use colouring::{Colouring, RestShape, colour, stored_energies, upper_end};
 pub use orbit::{Orbit, Ray, Seen};
@@ -22,5 +20,3 @@ pub use picking::{Picked, pick};
 pub use screenshot::{Screenshot, screenshot};
 pub use stage::{Moment, Stage, ViewError};
 pub use viewer::{Button, Command, HELP, Input, Viewer};
-#[cfg(feature = "view")]
-pub use window::open_window;

@@ -53,18 +53,6 @@ pub enum ViewError {
         /// Time of the last frame, in s.
         end: f64,
     },
-    /// A window needs a display.
-    #[error(
-        "there is no display to open a window on: set DISPLAY or WAYLAND_DISPLAY, \
-         or write a picture with --screenshot FILE"
-    )]
-    NoDisplay,
-    /// The rendering engine cannot open a window.
-    #[error("cannot open a window: {reason}; write a picture with --screenshot FILE")]
-    NoWindow {
-        /// Message of the engine.
-        reason: String,
-    },
     /// The picture cannot be initial.
     #[error(transparent)]
     Picture(#[from] crate::output::PictureError),

@@ -1,8 +1,9 @@
 use std::sync::Arc;
 
-use crate::least_squares::normal_matrix::{NormalMatrix, NormalPattern};
+use crate::least_squares::normal_matrix::NormalMatrix;
 use crate::least_squares::normal_solver::{NormalSolver, NormalSolverKind, SolverError};
 use crate::least_squares::residual_term::{LeastSquaresTerm, NormalEquations, TermSum};
+use crate::matrix::pattern::Pattern;
 
 /// Options of [`GaussNewton`].
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -119,7 +120,7 @@ pub enum GaussNewtonError {
 ///
 /// ```
 /// use std::sync::Arc;
-/// use energy_solve::{Couplings, GaussNewton, GaussNewtonOptions, NormalPattern, Placed, ResidualTerm};
+/// use energy_solve::{Couplings, GaussNewton, GaussNewtonOptions, Placed, ResidualTerm};
 /// use energy_dsl::energy;
 ///
 /// energy! {
@@ -127,7 +128,7 @@ pub enum GaussNewtonError {
 ///     residual Valley(x: Vec2) { [10 * (x[1] - x[0]^2), 1 - x[0]] }
 /// }
 ///
-/// let pattern = Arc::new(NormalPattern::new(1, [[0].as_slice()]).unwrap());
+/// let pattern = Arc::new(Couplings::pattern(1, [[0].as_slice()]).unwrap());
 /// let couplings = Arc::new(Couplings::new(&pattern, &[[0]]).unwrap());
 /// let mut valley = ResidualTerm::<Valley, 2>::new("valley", couplings, 1.0);
 /// valley.set_elements([Placed { element: Valley::new(), stencil: 0, weight: 1.0 }]);
@@ -143,7 +144,7 @@ pub struct GaussNewton<const D: usize> {
     equations: NormalEquations<D>,
     /// Equations of the second group of terms; `None` for one thread.
     second: Option<NormalEquations<D>>,
-    solver: NormalSolver<D>,
+    solver: NormalSolver,
     /// Damping, backtracking and linear solver.
     pub options: GaussNewtonOptions,
 }
@@ -153,9 +154,9 @@ impl<const D: usize> GaussNewton<D> {
     ///
     /// # Errors
     /// If the factorisation does not fit into memory.
-    pub fn new(pattern: Arc<NormalPattern>, options: GaussNewtonOptions) -> Result<Self, SolverError> {
-        let solver = NormalSolver::new(options.solver, &pattern)?;
-        let right = vec![[0.0; D]; pattern.blocks()];
+    pub fn new(pattern: Arc<Pattern>, options: GaussNewtonOptions) -> Result<Self, SolverError> {
+        let solver = NormalSolver::new(options.solver, D, &pattern)?;
+        let right = vec![[0.0; D]; pattern.rows()];
         let equations = NormalEquations { matrix: NormalMatrix::zeros(pattern), right };
         let second = options.two_threads.then(|| equations.clone());
         Ok(Self { equations, second, solver, options })
@@ -209,8 +210,8 @@ impl<const D: usize> GaussNewton<D> {
     /// If the matrix is not positive definite, or iterations do not converge.
     pub fn solve(&mut self, damping: f64) -> Result<(Vec<[f64; D]>, usize), SolverError> {
         let mut step: Vec<[f64; D]> = self.equations.right.iter().map(|block| block.map(|entry| -entry)).collect();
-        let solution = self.solver.solve(&self.equations.matrix, damping, &mut step)?;
-        Ok((step, solution.iterations))
+        let iterations = self.solver.solve(&self.equations.matrix, damping, &mut step)?;
+        Ok((step, iterations))
     }
 
     /// Returns E − ‖r + J d‖² = −2 dᵀJᵀr − dᵀJᵀJ d for the last linearisation.
@@ -325,7 +326,7 @@ impl<const D: usize> GaussNewton<D> {
     }
 
     fn check(&self, x: &[[f64; D]]) -> Result<(), GaussNewtonError> {
-        let expected = self.equations.matrix.pattern().blocks();
+        let expected = self.equations.matrix.pattern().rows();
         if x.len() != expected {
             return Err(GaussNewtonError::WrongLength { expected, found: x.len() });
         }

@@ -8,6 +8,6 @@ mod residual_term;
 
 pub use gauss_newton::{GaussNewton, GaussNewtonError, GaussNewtonOptions, IterationReport, Outcome, TermCost};
 pub use loss::Loss;
-pub use normal_matrix::{CouplingError, Couplings, NormalMatrix, NormalPattern};
-pub use normal_solver::{NormalSolution, NormalSolver, NormalSolverKind, SolverError};
+pub use normal_matrix::{CouplingError, Couplings, NormalMatrix};
+pub use normal_solver::{NormalSolverKind, SolverError};
 pub use residual_term::{LeastSquaresTerm, NormalEquations, Placed, ResidualTerm, TermSum};

@@ -1,7 +1,8 @@
-use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use energy_dsl::{Kernel, Lane, Level, Number, dispatch};
+
+use crate::matrix::pattern::{Pattern, Storage};
 
 /// Numbers in a stored row of a block: the lanes of the widest register, so that one or a few loads read a row. Numbers
 /// past the block's own columns are ignored.
@@ -46,66 +47,6 @@ pub enum CouplingError {
     },
 }
 
-/// The positions of the non-zero blocks of JᵀJ: the diagonal, and pairs of blocks of unknowns that share an element.
-/// Stores the upper triangle by rows, with ascending columns.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct NormalPattern {
-    row_start: Vec<usize>,
-    columns: Vec<u32>,
-}
-
-impl NormalPattern {
-    /// Creates a pattern over `blocks` blocks of unknowns that couples all blocks of each stencil.
-    ///
-    /// # Errors
-    /// If a stencil names a block out of range.
-    pub fn new<'a>(blocks: usize, stencils: impl IntoIterator<Item = &'a [u32]>) -> Result<Self, CouplingError> {
-        let mut right: Vec<BTreeSet<u32>> = (0..blocks as u32).map(|row| BTreeSet::from([row])).collect();
-        for (element, stencil) in stencils.into_iter().enumerate() {
-            if let Some(&block) = stencil.iter().find(|&&block| block as usize >= blocks) {
-                return Err(CouplingError::OutOfRange { element, block: block as usize, blocks });
-            }
-            for &a in stencil {
-                right[a as usize].extend(stencil.iter().filter(|&&b| b > a));
-            }
-        }
-        let mut pattern = Self { row_start: vec![0], columns: Vec::new() };
-        for columns in right {
-            pattern.columns.extend(columns);
-            pattern.row_start.push(pattern.columns.len());
-        }
-        Ok(pattern)
-    }
-
-    /// Returns the number of blocks of unknowns.
-    #[must_use]
-    pub fn blocks(&self) -> usize {
-        self.row_start.len() - 1
-    }
-
-    /// Returns the number of stored blocks, on and above the diagonal.
-    #[must_use]
-    pub fn stored(&self) -> usize {
-        self.columns.len()
-    }
-
-    /// Returns the columns of a row, beginning with the diagonal.
-    #[must_use]
-    pub fn row(&self, row: usize) -> &[u32] {
-        &self.columns[self.row_start[row]..self.row_start[row + 1]]
-    }
-
-    /// Returns the index of block (row, column) with row ≤ column; `None` if it is not in the pattern.
-    #[must_use]
-    pub fn slot(&self, row: usize, column: usize) -> Option<usize> {
-        self.row(row).binary_search(&(column as u32)).ok().map(|at| self.row_start[row] + at)
-    }
-
-    pub(crate) fn row_start(&self, row: usize) -> usize {
-        self.row_start[row]
-    }
-}
-
 /// Scatter map from elements to JᵀJ: the blocks of unknowns of each stencil, and where the products of their
 /// derivatives are stored. It depends on the stencils only, so a term can replace its elements.
 #[derive(Clone, Debug)]
@@ -118,12 +59,30 @@ pub struct Couplings {
 }
 
 impl Couplings {
+    /// Returns the pattern of JᵀJ over `blocks` blocks of unknowns: the upper triangle, with all blocks of each stencil
+    /// coupled.
+    ///
+    /// # Errors
+    /// If a stencil names a block out of range.
+    pub fn pattern<'a, S>(blocks: usize, stencils: S) -> Result<Pattern, CouplingError>
+    where
+        S: IntoIterator<Item = &'a [u32], IntoIter: Clone>,
+    {
+        let stencils = stencils.into_iter();
+        for (element, stencil) in stencils.clone().enumerate() {
+            if let Some(&block) = stencil.iter().find(|&&block| block as usize >= blocks) {
+                return Err(CouplingError::OutOfRange { element, block: block as usize, blocks });
+            }
+        }
+        Ok(Pattern::from_stencils(Storage::Upper, blocks, stencils))
+    }
+
     /// Looks up the stencils in a pattern.
     ///
     /// # Errors
     /// If a stencil repeats a block, or couples blocks that the pattern does not.
-    pub fn new<const K: usize>(pattern: &NormalPattern, stencils: &[[u32; K]]) -> Result<Self, CouplingError> {
-        let blocks = pattern.blocks();
+    pub fn new<const K: usize>(pattern: &Pattern, stencils: &[[u32; K]]) -> Result<Self, CouplingError> {
+        let blocks = pattern.rows();
         let mut slots = Vec::with_capacity(stencils.len() * K * (K + 1) / 2);
         for (element, stencil) in stencils.iter().enumerate() {
             for (i, &first) in stencil.iter().enumerate() {
@@ -135,8 +94,8 @@ impl Couplings {
                     if a == b && i != j {
                         return Err(CouplingError::Repeated { element, block: a });
                     }
-                    let slot =
-                        pattern.slot(a, b).ok_or(CouplingError::NotInPattern { element, first: a, second: b })?;
+                    let (slot, _) =
+                        pattern.place(a, b).ok_or(CouplingError::NotInPattern { element, first: a, second: b })?;
                     slots.push(2 * slot as u32 + u32::from(first > second));
                 }
             }
@@ -177,10 +136,10 @@ impl Couplings {
     }
 }
 
-/// The symmetric matrix JᵀJ of D×D blocks. Stores the upper triangle of a [`NormalPattern`].
+/// The symmetric matrix JᵀJ of D×D blocks. Stores the upper triangle.
 #[derive(Clone, Debug)]
 pub struct NormalMatrix<const D: usize> {
-    pattern: Arc<NormalPattern>,
+    pattern: Arc<Pattern>,
     pub(crate) values: Vec<WideBlock<D>>,
 }
 
@@ -189,15 +148,15 @@ impl<const D: usize> NormalMatrix<D> {
 
     /// Creates the zero matrix of a pattern.
     #[must_use]
-    pub fn zeros(pattern: Arc<NormalPattern>) -> Self {
+    pub fn zeros(pattern: Arc<Pattern>) -> Self {
         let () = Self::FITS;
-        let values = vec![[[0.0; WIDTH]; D]; pattern.stored()];
+        let values = vec![[[0.0; WIDTH]; D]; pattern.blocks()];
         Self { pattern, values }
     }
 
     /// Returns the pattern of the matrix.
     #[must_use]
-    pub fn pattern(&self) -> &Arc<NormalPattern> {
+    pub fn pattern(&self) -> &Arc<Pattern> {
         &self.pattern
     }
 
@@ -216,12 +175,11 @@ impl<const D: usize> NormalMatrix<D> {
     /// Returns block (row, column); zero if it is not in the pattern.
     #[must_use]
     pub fn block(&self, row: usize, column: usize) -> [[f64; D]; D] {
-        let place = self.pattern.slot(row.min(column), row.max(column));
-        std::array::from_fn(|i| {
-            std::array::from_fn(|j| {
-                place.map_or(0.0, |at| if row <= column { self.values[at][i][j] } else { self.values[at][j][i] })
-            })
-        })
+        let place = self.pattern.place(row, column);
+        let entry = |i: usize, j: usize| {
+            place.map_or(0.0, |(at, turned)| if turned { self.values[at][j][i] } else { self.values[at][i][j] })
+        };
+        std::array::from_fn(|i| std::array::from_fn(|j| entry(i, j)))
     }
 
     /// Computes y = (A + μ 1) x.
@@ -230,7 +188,7 @@ impl<const D: usize> NormalMatrix<D> {
     }
 
     pub(crate) fn diagonal(&self, row: usize) -> &WideBlock<D> {
-        &self.values[self.pattern.row_start(row)]
+        &self.values[self.pattern.diagonal(row)]
     }
 }
 
@@ -253,11 +211,10 @@ impl<const D: usize> Kernel for Product<'_, D> {
         let wide: Vec<[f64; WIDTH]> =
             x.iter().map(|x| std::array::from_fn(|i| if i < D { x[i] } else { 0.0 })).collect();
         let mut below = vec![[0.0; WIDTH]; x.len()];
-        for row in 0..pattern.blocks() {
-            let start = pattern.row_start(row);
+        for row in 0..pattern.rows() {
             let mut sums = [[0.0; WIDTH]; D];
-            for (at, &column) in pattern.row(row).iter().enumerate() {
-                let (block, column) = (&matrix.values[start + at], column as usize);
+            for (at, column) in pattern.row(row) {
+                let block = &matrix.values[at];
                 for i in 0..D {
                     add_product::<L>(&mut sums[i], &block[i], &wide[column]);
                 }
@@ -300,18 +257,19 @@ mod tests {
 
     #[test]
     fn a_pattern_is_the_diagonal_and_the_coupled_blocks() {
-        let pattern = NormalPattern::new(4, [[3, 0].as_slice(), &[0, 1]]).unwrap();
+        let pattern = Couplings::pattern(4, [[3, 0].as_slice(), &[0, 1]]).unwrap();
         assert_eq!(
-            (0..4).map(|row| pattern.row(row).to_vec()).collect::<Vec<_>>(),
+            (0..4).map(|row| pattern.row(row).map(|(_, column)| column).collect()).collect::<Vec<Vec<_>>>(),
             [vec![0, 1, 3], vec![1], vec![2], vec![3]]
         );
-        assert_eq!(pattern.slot(0, 3), Some(2));
-        assert_eq!(pattern.slot(1, 3), None);
+        assert_eq!(pattern.place(0, 3), Some((2, false)));
+        assert_eq!(pattern.place(3, 0), Some((2, true)));
+        assert_eq!(pattern.place(1, 3), None);
     }
 
     #[test]
     fn stencils_that_do_not_fit_are_rejected() {
-        let pattern = NormalPattern::new(3, [[0, 1].as_slice()]).unwrap();
+        let pattern = Couplings::pattern(3, [[0, 1].as_slice()]).unwrap();
         assert!(matches!(Couplings::new(&pattern, &[[0, 0]]), Err(CouplingError::Repeated { element: 0, block: 0 })));
         assert!(matches!(
             Couplings::new(&pattern, &[[0, 1], [0, 7]]),
@@ -321,12 +279,12 @@ mod tests {
             Couplings::new(&pattern, &[[2, 1]]),
             Err(CouplingError::NotInPattern { first: 1, second: 2, .. })
         ));
-        assert!(NormalPattern::new(3, [[3].as_slice()]).is_err());
+        assert!(Couplings::pattern(3, [[3].as_slice()]).is_err());
     }
 
     #[test]
     fn products_use_both_triangles() {
-        let pattern = Arc::new(NormalPattern::new(2, [[0, 1].as_slice()]).unwrap());
+        let pattern = Arc::new(Couplings::pattern(2, [[0, 1].as_slice()]).unwrap());
         let mut matrix = NormalMatrix::<2>::zeros(pattern);
         // The padding past a block's own columns must be ignored.
         for (at, value) in matrix.values.iter_mut().enumerate() {

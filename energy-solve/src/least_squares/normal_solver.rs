@@ -1,5 +1,8 @@
-use crate::least_squares::normal_matrix::{NormalMatrix, NormalPattern};
-use crate::linear::sparse_factor::SparseFactor;
+use crate::least_squares::normal_matrix::NormalMatrix;
+use crate::linear::conjugate_gradients::{Steps, conjugate_gradients};
+use crate::linear::solve::{SolveOptions, SolveReport, StopReason};
+use crate::linear::sparse_factor::{OutOfMemory, SparseFactor};
+use crate::matrix::pattern::Pattern;
 
 /// The solver of (JᵀJ + μ 1) d = −Jᵀr.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -36,132 +39,127 @@ pub enum SolverError {
     },
 }
 
-/// Statistics of one solve.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct NormalSolution {
-    /// Iterations of conjugate gradients; 0 for a factorisation.
-    pub iterations: usize,
-}
-
 /// A solver for matrices of one pattern.
 #[derive(Debug)]
-pub struct NormalSolver<const D: usize> {
-    kind: NormalSolverKind,
-    factor: Option<Box<Factor>>,
+pub(super) enum NormalSolver {
+    Cholesky(Box<SparseFactor>),
+    ConjugateGradients(SolveOptions),
 }
 
-impl<const D: usize> NormalSolver<D> {
-    /// Analyses a pattern.
+impl NormalSolver {
+    /// Analyses a pattern whose blocks have `size` rows.
     ///
     /// # Errors
     /// If memory runs out.
-    pub fn new(kind: NormalSolverKind, pattern: &NormalPattern) -> Result<Self, SolverError> {
-        let factor = match kind {
-            NormalSolverKind::Cholesky => Some(Box::new(Factor::new::<D>(pattern)?)),
-            NormalSolverKind::ConjugateGradients { .. } => None,
-        };
-        Ok(Self { kind, factor })
+    pub(super) fn new(kind: NormalSolverKind, size: usize, pattern: &Pattern) -> Result<Self, SolverError> {
+        match kind {
+            NormalSolverKind::Cholesky => match SparseFactor::new(size, pattern) {
+                Ok(factor) => Ok(Self::Cholesky(factor.into())),
+                Err(OutOfMemory) => Err(SolverError::OutOfMemory { unknowns: size * pattern.rows() }),
+            },
+            NormalSolverKind::ConjugateGradients { relative_tolerance, iteration_limit } => {
+                Ok(Self::ConjugateGradients(SolveOptions { relative_tolerance, iteration_limit }))
+            }
+        }
     }
 
-    /// Solves (A + μ 1) x = b in place; `x` holds b first.
+    /// Solves (A + μ 1) x = b in place; `x` holds b first. Returns the number of iterations; 0 for a factorisation.
     ///
     /// # Errors
     /// If the matrix is not positive definite, or iterations do not converge.
-    pub fn solve(
+    pub(super) fn solve<const D: usize>(
         &mut self,
         matrix: &NormalMatrix<D>,
         damping: f64,
         x: &mut [[f64; D]],
-    ) -> Result<NormalSolution, SolverError> {
-        match (self.kind, &mut self.factor) {
-            (NormalSolverKind::ConjugateGradients { relative_tolerance, iteration_limit }, _) => {
-                conjugate_gradients(matrix, damping, x, relative_tolerance, iteration_limit)
+    ) -> Result<usize, SolverError> {
+        match self {
+            Self::Cholesky(factor) => {
+                let entry = |block: usize, i: usize, j: usize| matrix.values[block][i][j];
+                factor.factor(damping, entry).map_err(|_| SolverError::NotPositiveDefinite)?;
+                factor.solve(x.as_flattened_mut());
+                Ok(0)
             }
-            (NormalSolverKind::Cholesky, Some(factor)) => {
-                factor.solve(matrix, damping, x)?;
-                Ok(NormalSolution::default())
-            }
-            (NormalSolverKind::Cholesky, None) => unreachable!("`new` created the factor"),
+            Self::ConjugateGradients(options) => iterate(matrix, damping, x, options),
         }
     }
 }
 
-/// A sparse Cholesky factor of a block matrix.
-#[derive(Debug)]
-struct Factor(SparseFactor);
-
-impl Factor {
-    fn new<const D: usize>(pattern: &NormalPattern) -> Result<Self, SolverError> {
-        let unknowns = pattern.blocks() * D;
-        let (mut rows, mut columns) = (vec![0], Vec::new());
-        for row in 0..pattern.blocks() {
-            columns.extend(pattern.row(row).iter().map(|&column| column as usize));
-            rows.push(columns.len());
-        }
-        SparseFactor::new(D, &rows, &columns).map(Self).map_err(|_| SolverError::OutOfMemory { unknowns })
-    }
-
-    fn solve<const D: usize>(
-        &mut self,
-        matrix: &NormalMatrix<D>,
-        damping: f64,
-        x: &mut [[f64; D]],
-    ) -> Result<(), SolverError> {
-        let entry = |block: usize, i: usize, j: usize| matrix.values[block][i][j];
-        self.0.factor(damping, entry).map_err(|_| SolverError::NotPositiveDefinite)?;
-        self.0.solve(x.as_flattened_mut());
-        Ok(())
-    }
-}
-
-/// Solves by preconditioned conjugate gradients, starting from zero; `b` receives the solution.
-fn conjugate_gradients<const D: usize>(
+/// Solves (A + μ 1) x = b by conjugate gradients with the diagonal blocks as preconditioner; `x` holds b first.
+fn iterate<const D: usize>(
     matrix: &NormalMatrix<D>,
     damping: f64,
-    b: &mut [[f64; D]],
-    relative_tolerance: f64,
-    iteration_limit: usize,
-) -> Result<NormalSolution, SolverError> {
-    let factors: Vec<[[f64; D]; D]> = (0..b.len())
-        .map(|row| lower_factor(matrix.diagonal(row), damping).ok_or(SolverError::NotPositiveDefinite))
-        .collect::<Result<_, _>>()?;
-    let mut x = vec![[0.0; D]; b.len()];
-    let residual = b;
-    let mut preconditioned: Vec<[f64; D]> = residual.iter().zip(&factors).map(|(r, l)| divided(l, r)).collect();
-    let mut direction = preconditioned.clone();
-    let mut product = x.clone();
-    let mut square = dot(residual, &preconditioned);
-    let goal = square * relative_tolerance * relative_tolerance;
-    let mut iterations = 0;
-    while square > goal {
-        if iterations == iteration_limit {
-            return Err(SolverError::NotConverged { iterations });
-        }
-        matrix.multiply_damped(damping, &direction, &mut product);
-        let curvature = dot(&direction, &product);
-        if curvature.is_nan() || curvature <= 0.0 {
-            return Err(SolverError::NotPositiveDefinite);
-        }
-        let step = square / curvature;
-        for row in 0..x.len() {
-            for i in 0..D {
-                x[row][i] += step * direction[row][i];
-                residual[row][i] -= step * product[row][i];
-            }
-            preconditioned[row] = divided(&factors[row], &residual[row]);
-        }
-        let next = dot(residual, &preconditioned);
-        let ratio = next / square;
-        for (direction, preconditioned) in direction.iter_mut().zip(&preconditioned) {
+    x: &mut [[f64; D]],
+    options: &SolveOptions,
+) -> Result<usize, SolverError> {
+    let factors = (0..x.len()).map(|row| lower_factor(matrix.diagonal(row), damping));
+    let factors = factors.collect::<Option<Vec<_>>>().ok_or(SolverError::NotPositiveDefinite)?;
+    let residual = x.to_vec();
+    let preconditioned: Vec<[f64; D]> = residual.iter().zip(&factors).map(|(r, l)| divided(l, r)).collect();
+    let mut steps = NormalSteps {
+        direction: vec![[0.0; D]; x.len()],
+        product: vec![[0.0; D]; x.len()],
+        matrix,
+        damping,
+        factors,
+        residual,
+        preconditioned,
+        x,
+    };
+    let SolveReport { iterations, stopped, .. } = conjugate_gradients(&mut steps, options);
+    match stopped {
+        StopReason::Converged => Ok(iterations),
+        StopReason::IterationLimit => Err(SolverError::NotConverged { iterations }),
+        _ => Err(SolverError::NotPositiveDefinite),
+    }
+}
+
+/// The steps of conjugate gradients for A + μ 1.
+struct NormalSteps<'a, const D: usize> {
+    matrix: &'a NormalMatrix<D>,
+    damping: f64,
+    /// Factors of the diagonal blocks; see [`lower_factor`].
+    factors: Vec<[[f64; D]; D]>,
+    residual: Vec<[f64; D]>,
+    preconditioned: Vec<[f64; D]>,
+    direction: Vec<[f64; D]>,
+    product: Vec<[f64; D]>,
+    x: &'a mut [[f64; D]],
+}
+
+impl<const D: usize> Steps for NormalSteps<'_, D> {
+    fn start(&mut self) -> (f64, f64) {
+        self.x.fill([0.0; D]);
+        (1.0, dot(&self.residual, &self.preconditioned))
+    }
+
+    fn precondition(&mut self, square: f64) -> f64 {
+        square
+    }
+
+    fn conjugate(&mut self, ratio: f64) -> f64 {
+        for (direction, preconditioned) in self.direction.iter_mut().zip(&self.preconditioned) {
             for i in 0..D {
                 direction[i] = ratio * direction[i] + preconditioned[i];
             }
         }
-        square = next;
-        iterations += 1;
+        self.matrix.multiply_damped(self.damping, &self.direction, &mut self.product);
+        dot(&self.direction, &self.product)
     }
-    residual.copy_from_slice(&x);
-    Ok(NormalSolution { iterations })
+
+    fn advance(&mut self, step: f64) -> f64 {
+        for row in 0..self.x.len() {
+            for i in 0..D {
+                self.x[row][i] += step * self.direction[row][i];
+                self.residual[row][i] -= step * self.product[row][i];
+            }
+            self.preconditioned[row] = divided(&self.factors[row], &self.residual[row]);
+        }
+        dot(&self.residual, &self.preconditioned)
+    }
+
+    /// Nothing is left to do: x is in place.
+    fn finish(&mut self, _: f64) {}
 }
 
 fn dot<const D: usize>(a: &[[f64; D]], b: &[[f64; D]]) -> f64 {

@@ -1,22 +1,25 @@
 use energy_dsl::Vector3;
 
-use crate::linear::preconditioner::Preconditioner;
-use crate::linear::solve::{SolveOptions, SolveReport, StopReason, norm, residual};
+use crate::linear::block_jacobi::BlockJacobi;
+use crate::linear::solve::{SingularBlock, SolveOptions, SolveReport, StopReason};
 use crate::matrix::block_matrix::BlockMatrix;
 use crate::matrix::precision::Precision;
-use crate::matrix::vector::{add_scaled, dot};
+use crate::matrix::vector::{add_scaled, dot, scale_and_add};
 
 /// Solves A x = b for any invertible A by BiCGSTAB (van der Vorst 1992), starting from the given x. For force laws,
 /// whose Jacobians are not symmetric.
 ///
-/// The preconditioner D acts from the left: D⁻¹A x = D⁻¹b.
+/// The diagonal blocks D precondition from the left: D⁻¹A x = D⁻¹b.
+///
+/// # Errors
+/// If a diagonal block is singular or not finite.
 pub fn bicgstab(
     matrix: &BlockMatrix<impl Precision>,
-    preconditioner: &impl Preconditioner,
     b: &[Vector3<f64>],
     x: &mut [Vector3<f64>],
     options: &SolveOptions,
-) -> SolveReport {
+) -> Result<SolveReport, SingularBlock> {
+    let preconditioner = BlockJacobi::new(matrix)?;
     let mut scratch = vec![[0.0; 3]; b.len()];
     let mut multiply = |v: &[Vector3<f64>], out: &mut [Vector3<f64>]| {
         matrix.multiply(v, &mut scratch);
@@ -72,5 +75,17 @@ pub fn bicgstab(
             }
         }
     };
-    SolveReport { iterations, initial_residual, final_residual: size, stopped }
+    Ok(SolveReport { iterations, initial_residual, final_residual: size, stopped })
+}
+
+/// Returns b − A x.
+fn residual(matrix: &BlockMatrix<impl Precision>, b: &[Vector3<f64>], x: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
+    let mut r = vec![[0.0; 3]; b.len()];
+    matrix.multiply(x, &mut r);
+    scale_and_add(&mut r, -1.0, b);
+    r
+}
+
+fn norm(a: &[Vector3<f64>]) -> f64 {
+    dot(a, a).sqrt()
 }

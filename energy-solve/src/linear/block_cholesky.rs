@@ -2,11 +2,10 @@ use std::sync::Arc;
 
 use energy_dsl::Vector3;
 
-use crate::linear::preconditioner::Preconditioner;
 use crate::linear::solve::{SolveReport, StopReason};
-use crate::linear::sparse_factor::SparseFactor;
+use crate::linear::sparse_factor::{OutOfMemory, SparseFactor};
 use crate::matrix::block_matrix::BlockMatrix;
-use crate::matrix::pattern::{Pattern, Storage};
+use crate::matrix::pattern::Pattern;
 use crate::matrix::precision::Precision;
 
 /// Sparse Cholesky factorisation A = L Lᵀ, which solves to full precision.
@@ -16,7 +15,7 @@ use crate::matrix::precision::Precision;
 ///
 /// Vertices are eliminated in an approximate minimum degree order (Amestoy, Davis and Duff, SIAM J. Matrix Anal. Appl.
 /// 17, 1996). The order and the fill-in are computed once per pattern; [`BlockCholesky::factor`] reuses them for every
-/// matrix. The factor of a matrix also preconditions conjugate gradients for a similar matrix.
+/// matrix.
 ///
 /// ```
 /// use energy_solve::{BlockCholesky, BlockMatrix, Pattern, Storage};
@@ -64,14 +63,8 @@ impl BlockCholesky {
     /// # Panics
     /// If the pattern does not store an upper triangle.
     pub fn new(pattern: &Arc<Pattern>) -> Result<Self, CholeskyError> {
-        assert_eq!(pattern.storage(), Storage::Upper, "only symmetric matrices have Cholesky factors");
-        let (mut rows, mut columns) = (vec![0], Vec::new());
-        for row in 0..pattern.rows() {
-            columns.extend(pattern.row(row).map(|(_, column)| column));
-            rows.push(columns.len());
-        }
-        let factor = SparseFactor::new(3, &rows, &columns);
-        let factor = factor.map_err(|_| CholeskyError::OutOfMemory { rows: pattern.rows() })?;
+        let factor =
+            SparseFactor::new(3, pattern).map_err(|OutOfMemory| CholeskyError::OutOfMemory { rows: pattern.rows() })?;
         Ok(Self { pattern: Arc::clone(pattern), factor })
     }
 
@@ -95,22 +88,11 @@ impl BlockCholesky {
     }
 
     /// Computes x ← A⁻¹ b for the last factored matrix A. The report tells if the solution is not finite.
-    pub fn solve(&mut self, b: &[Vector3<f64>], x: &mut [Vector3<f64>]) -> SolveReport {
+    pub fn solve(&self, b: &[Vector3<f64>], x: &mut [Vector3<f64>]) -> SolveReport {
         x.copy_from_slice(b);
         self.factor.solve(x.as_flattened_mut());
         let finite = x.as_flattened().iter().all(|component| component.is_finite());
         let stopped = if finite { StopReason::Converged } else { StopReason::NonFinite };
         SolveReport { stopped, ..SolveReport::indefinite() }
-    }
-}
-
-impl Preconditioner for BlockCholesky {
-    fn is_positive_definite(&self) -> bool {
-        true
-    }
-
-    fn apply(&self, r: &[Vector3<f64>], z: &mut [Vector3<f64>]) {
-        z.copy_from_slice(r);
-        self.factor.solve(z.as_flattened_mut());
     }
 }

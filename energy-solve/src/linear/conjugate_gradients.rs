@@ -1,59 +1,54 @@
-use energy_dsl::Vector3;
+use crate::linear::solve::{SolveOptions, SolveReport, StopReason};
 
-use crate::linear::preconditioner::Preconditioner;
-use crate::linear::solve::{SolveOptions, SolveReport, StopReason, residual};
-use crate::matrix::block_matrix::BlockMatrix;
-use crate::matrix::precision::Precision;
-use crate::matrix::vector::{add_scaled, dot, scale_and_add};
+/// The vector operations of preconditioned conjugate gradients for one system A x = b.
+///
+/// Each solver fuses them with its preconditioner and with its threads. Threads that solve one system together run the
+/// loop side by side, so each number must be the same in all of them.
+pub(crate) trait Steps {
+    /// Sets x = 0 and r = b. Returns the unit of the numbers that follow, and ‖r‖² in the norm of the stopping test.
+    fn start(&mut self) -> (f64, f64);
 
-/// Solves A x = b for a symmetric positive definite A by preconditioned conjugate gradients, starting from the given x
-/// (Shewchuk, "An introduction to the conjugate gradient method without the agonizing pain", 1994, B3).
+    /// Computes z = M⁻¹ r. Returns r · z. `square` is the last ‖r‖².
+    fn precondition(&mut self, square: f64) -> f64;
+
+    /// Computes p ← z + β p and A p. Returns p · A p.
+    fn conjugate(&mut self, ratio: f64) -> f64;
+
+    /// Computes x ← x + α p and r ← r − α A p. Returns ‖r‖².
+    fn advance(&mut self, step: f64) -> f64;
+
+    /// Writes x, in this unit.
+    fn finish(&mut self, unit: f64);
+}
+
+/// Solves a symmetric positive definite system by preconditioned conjugate gradients, starting from x = 0 (Shewchuk,
+/// "An introduction to the conjugate gradient method without the agonizing pain", 1994, B3).
 ///
 /// Stops at a direction of non-positive curvature; see [`StopReason::IndefiniteCurvature`].
-pub fn conjugate_gradients(
-    matrix: &BlockMatrix<impl Precision>,
-    preconditioner: &impl Preconditioner,
-    b: &[Vector3<f64>],
-    x: &mut [Vector3<f64>],
-    options: &SolveOptions,
-) -> SolveReport {
-    let mut z = vec![[0.0; 3]; b.len()];
-    preconditioner.apply(b, &mut z);
-    let target = options.relative_tolerance * dot(b, &z).sqrt();
-
-    let mut r = residual(matrix, b, x);
-    preconditioner.apply(&r, &mut z);
-    let mut p = z.clone();
-    let mut ap = vec![[0.0; 3]; b.len()];
-    let mut rho = dot(&r, &z);
-    let initial_residual = rho.abs().sqrt();
-    let mut iterations = 0;
+#[inline(always)]
+pub(crate) fn conjugate_gradients(steps: &mut impl Steps, options: &SolveOptions) -> SolveReport {
+    let (unit, initial) = steps.start();
+    let target = options.relative_tolerance.powi(2) * initial;
+    let (mut square, mut along, mut iterations) = (initial, 0.0, 0);
     let stopped = loop {
-        if !preconditioner.is_positive_definite() {
-            break StopReason::IndefiniteCurvature; // a diagonal block is indefinite, and so is the matrix
-        }
-        if !rho.is_finite() || !target.is_finite() {
+        if !square.is_finite() || !unit.is_finite() {
             break StopReason::NonFinite;
         }
-        if rho.sqrt() <= target {
+        if square <= target {
             break StopReason::Converged;
         }
         if iterations == options.iteration_limit {
             break StopReason::IterationLimit;
         }
-        matrix.multiply(&p, &mut ap);
-        let curvature = dot(&p, &ap);
-        if curvature <= 0.0 {
+        let previous = std::mem::replace(&mut along, steps.precondition(square));
+        let curvature = steps.conjugate(if iterations == 0 { 0.0 } else { along / previous });
+        if along <= 0.0 || curvature <= 0.0 {
             break StopReason::IndefiniteCurvature;
         }
-        let step = rho / curvature;
-        add_scaled(x, step, &p);
-        add_scaled(&mut r, -step, &ap);
-        preconditioner.apply(&r, &mut z);
-        let previous = rho;
-        rho = dot(&r, &z);
-        scale_and_add(&mut p, rho / previous, &z);
+        square = steps.advance(along / curvature);
         iterations += 1;
     };
-    SolveReport { iterations, initial_residual, final_residual: rho.abs().sqrt(), stopped }
+    steps.finish(unit);
+    let [initial_residual, final_residual] = [initial, square].map(|square| square.sqrt() * unit);
+    SolveReport { iterations, initial_residual, final_residual, stopped }
 }

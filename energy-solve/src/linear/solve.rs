@@ -1,7 +1,10 @@
-use crate::matrix::block_matrix::BlockMatrix;
-use crate::matrix::precision::Precision;
-use crate::matrix::vector::dot;
-use energy_dsl::Vector3;
+/// A diagonal block without an inverse.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("the diagonal block of row {row} is singular or not finite; a free vertex needs mass or stiffness")]
+pub struct SingularBlock {
+    /// Block row of the diagonal block.
+    pub row: usize,
+}
 
 /// Stopping criteria of a linear solver.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -74,20 +77,4 @@ impl SolveReport {
     pub fn converged(&self) -> bool {
         self.stopped == StopReason::Converged
     }
-}
-
-/// Returns b − A x.
-pub(crate) fn residual(
-    matrix: &BlockMatrix<impl Precision>,
-    b: &[Vector3<f64>],
-    x: &[Vector3<f64>],
-) -> Vec<Vector3<f64>> {
-    let mut r = vec![[0.0; 3]; b.len()];
-    matrix.multiply(x, &mut r);
-    crate::matrix::vector::scale_and_add(&mut r, -1.0, b);
-    r
-}
-
-pub(crate) fn norm(a: &[Vector3<f64>]) -> f64 {
-    dot(a, a).sqrt()
 }

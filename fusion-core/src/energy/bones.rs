@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use energy_elements::{Binding, BoneBinding, GraphEdge, SkeletonPlane};
-use energy_solve::{CouplingError, Couplings, Loss, NormalPattern, Placed, ResidualTerm};
+use energy_solve::{CouplingError, Couplings, Loss, Pattern, Placed, ResidualTerm};
 use nalgebra::{Isometry3, Vector3};
 
 use super::BoneTargets;
@@ -111,7 +111,7 @@ impl BoneStencils {
         self,
         model: &DeformationModel,
         options: &EnergyOptions,
-        pattern: &NormalPattern,
+        pattern: &Pattern,
     ) -> Result<BoneTerms, CouplingError> {
         let (turn, weights) = (options.angle.turn(), &options.weights);
         let first = model.nodes.len() as u32;

@@ -6,7 +6,7 @@ use energy_elements::{
     BlendedPoint1, BlendedPoint4, BlendedPoint8, FrozenPlane1, FrozenPlane4, FrozenPlane8, NonrigidPlane1,
     NonrigidPlane4, NonrigidPlane8,
 };
-use energy_solve::{CouplingError, Couplings, LeastSquaresTerm, Loss, NormalPattern, Placed, ResidualTerm};
+use energy_solve::{CouplingError, Couplings, LeastSquaresTerm, Loss, Pattern, Placed, ResidualTerm};
 use nalgebra::Vector3;
 
 use super::options::{EnergyOptions, NormalDerivative};
@@ -99,7 +99,7 @@ pub(super) trait DataTerm: Debug + Send {
 pub(super) fn data_term(
     model: &DeformationModel,
     options: &EnergyOptions,
-    pattern: &NormalPattern,
+    pattern: &Pattern,
 ) -> Result<Box<dyn DataTerm>, CouplingError> {
     Ok(match model.options.nodes_per_vertex {
         1 => Box::new(Nonrigid::<One, 1>::new(model, options, pattern)?),
@@ -122,7 +122,7 @@ fn weights_of<const K: usize>(model: &DeformationModel, vertex: usize) -> [f64; 
 }
 
 impl<B: Blend<K>, const K: usize> Nonrigid<B, K> {
-    fn new(model: &DeformationModel, options: &EnergyOptions, pattern: &NormalPattern) -> Result<Self, CouplingError> {
+    fn new(model: &DeformationModel, options: &EnergyOptions, pattern: &Pattern) -> Result<Self, CouplingError> {
         let stencils: Vec<[u32; K]> =
             model.vertex_nodes.iter().map(|nodes| std::array::from_fn(|k| nodes[k])).collect();
         let couplings = Arc::new(Couplings::new(pattern, &stencils)?);

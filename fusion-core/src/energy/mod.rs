@@ -8,7 +8,7 @@ mod options;
 use std::sync::Arc;
 
 use energy_elements::{Binding, GraphEdge, SkeletonPlane};
-use energy_solve::{CouplingError, Couplings, LeastSquaresTerm, Loss, NormalPattern, Placed, ResidualTerm};
+use energy_solve::{CouplingError, Couplings, LeastSquaresTerm, Loss, Pattern, Placed, ResidualTerm};
 use nalgebra::{Isometry3, Vector3};
 
 use self::bones::{BoneStencils, BoneTerms};
@@ -52,7 +52,7 @@ pub struct BoneTargets<'a> {
 pub struct FusionEnergy {
     /// Options of the energy.
     pub options: EnergyOptions,
-    pattern: Arc<NormalPattern>,
+    pattern: Arc<Pattern>,
     data: Box<dyn DataTerm>,
     graph: ResidualTerm<GraphEdge, 6>,
     binding: ResidualTerm<Binding, 6>,
@@ -79,13 +79,14 @@ impl FusionEnergy {
             .collect();
         let skinning = unknown_bones.then(|| BoneStencils::new(model));
         let bone_count = skinning.as_ref().map_or(0, |_| model.bones.len());
-        let all = model
+        let all: Vec<&[u32]> = model
             .vertex_nodes
             .iter()
             .map(Vec::as_slice)
             .chain(edges.iter().map(<[u32; 2]>::as_slice))
-            .chain(skinning.iter().flat_map(BoneStencils::all));
-        let pattern = Arc::new(NormalPattern::new(nodes + bone_count, all)?);
+            .chain(skinning.iter().flat_map(BoneStencils::all))
+            .collect();
+        let pattern = Arc::new(Couplings::pattern(nodes + bone_count, all.iter().copied())?);
 
         let turn = options.angle.turn();
         let data = data_term(model, &options, &pattern)?;
@@ -109,7 +110,7 @@ impl FusionEnergy {
 
     /// Returns the pattern of JᵀJ.
     #[must_use]
-    pub fn pattern(&self) -> &Arc<NormalPattern> {
+    pub fn pattern(&self) -> &Arc<Pattern> {
         &self.pattern
     }
 

@@ -69,7 +69,7 @@ impl Tracker {
         let steps =
             GaussNewtonOptions { damping: options.damping, solver, two_threads: true, ..GaussNewtonOptions::default() };
         let solver = GaussNewton::new(energy.pattern().clone(), steps)?;
-        let twists = vec![[0.0; 6]; energy.pattern().blocks()];
+        let twists = vec![[0.0; 6]; energy.pattern().rows()];
         let offsets = vec![Isometry3::identity(); model.nodes.len()];
         let node_prediction = Prediction::new(model.nodes.clone());
         let bone_prediction = Prediction::new(model.bones.iter().map(|bone| bone.head.into()).collect());

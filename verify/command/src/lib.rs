@@ -9,6 +9,7 @@
 
 mod audit_page;
 pub mod bench;
+mod complex;
 mod inputs;
 mod listings;
 pub mod reference;

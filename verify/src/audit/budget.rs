@@ -52,7 +52,7 @@ impl Meter {
         self.charge(self.value);
     }
 
-    /// All blocks by hyper-dual numbers.
+    /// All blocks by dual numbers.
     pub(super) fn duals(&self) {
         self.charge(8 * self.value * self.derivatives);
     }

@@ -33,7 +33,7 @@ impl<'a> Case<'a> {
         rotate_all(&self.turn, vectors)
     }
 
-    /// Returns the blocks by hyper-dual numbers through the textbook form.
+    /// Returns the blocks by dual numbers through the textbook form.
     pub(super) fn duals(&self) -> &[Block] {
         let Subject { declaration, formula, meter, .. } = self.subject;
         self.dual.get_or_init(|| {

@@ -11,7 +11,7 @@ use crate::sample::Sample;
 pub enum Check {
     /// Multi-precision agrees as well as the reference demands of every record.
     Accuracy,
-    /// Hyper-dual numbers through the textbook form agree.
+    /// Dual numbers through the textbook form agree.
     DualNumbers,
     /// Finite differences of the block one order below agree.
     FiniteDifferences,

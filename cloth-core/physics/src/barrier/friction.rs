@@ -317,3 +317,86 @@ fn sliding(pair: &Pair, weights: &[f64; 4], anchor: Option<Anchor>, x: &[Vector3
     }
     sum
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::collision::{Core, PairKind};
+    use crate::geometry::{Pose, norm};
+
+    const UP: Vector3<f64> = [0.0, 0.0, 1.0];
+    /// A triangle of cloth, a triangle of an obstacle below it, and the obstacle's frame.
+    const POSITIONS: [Vector3<f64>; 10] = [
+        [0.2, 0.1, 0.01],
+        [1.2, 0.1, 0.01],
+        [0.2, 1.1, 0.02],
+        [0.0, 0.0, 0.0],
+        [1.0, 0.0, 0.0],
+        [0.0, 1.0, 0.0],
+        [3.0, 2.0, 1.0],
+        [4.0, 2.0, 1.0],
+        [3.0, 3.0, 1.0],
+        [3.0, 2.0, 2.0],
+    ];
+
+    fn pair(vertices: [u32; 4]) -> Pair {
+        Pair { kind: PairKind::PointTriangle, features: [0, 0], vertices }
+    }
+
+    #[test]
+    fn a_way_along_the_normal_bends_no_bristle() {
+        let (weights, straight) = ([1.0, -0.5, -0.3, -0.2], [0.0; 3]);
+        let pair = pair([0, 3, 4, 5]);
+        let one = Sliding { pair, weights, anchor: None, normal: UP, straight };
+        let friction =
+            Friction { sliding: Some(Slidings { pairs: vec![one], elements: Vec::new() }), ..Friction::default() };
+        // Ten lengths of a bristle along the normal, and less than one across.
+        let mut x = [[0.0; 3]; 6];
+        x[0] = [3e-5, -4e-5, 10.0 * LENGTH];
+        let deflection = friction.bristles_at(&x).deflection(&pair, UP, false);
+        let error = norm(subtract(deflection, [3e-5, -4e-5, 0.0]));
+        assert!(error < 1e-12 * LENGTH, "{deflection:?}");
+    }
+
+    /// Returns the pair's sliding on an obstacle that moves, and the closest points on cloth and obstacle.
+    fn on_obstacle(cloth_is_first: bool) -> (Sliding, [Vector3<f64>; 2]) {
+        let core = Core { vertices: POSITIONS[3..6].to_vec(), triangles: vec![[0, 1, 2]], ..Core::default() };
+        let mesh = CollisionMesh::new(3, &[[0, 1, 2]], &[], &[]).with_obstacles(&[core]);
+        let grips = vec![Grip { coefficient: 0.5, frame: Some(6), deforms: false }];
+        let friction = Friction { grips, start: POSITIONS.to_vec(), ..Friction::default() };
+        let pair = pair(if cloth_is_first { [0, 3, 4, 5] } else { [4, 0, 1, 2] });
+        let closest = Closest::of(&pair, &pair.corners(&POSITIONS));
+        let (weights, anchor) = friction.sliding_point(&mesh, &pair, &closest);
+        let own = |corner: usize| if pair.vertices[corner] < 3 { closest.weights[corner].abs() } else { 0.0 };
+        let at = pair.corners(&POSITIONS);
+        let point = (0..4).fold([0.0; 3], |sum, corner| add_scaled(sum, own(corner), at[corner]));
+        let sliding = Sliding { pair, weights, anchor, normal: closest.normal, straight: [0.0; 3] };
+        (sliding, [point, point])
+    }
+
+    #[test]
+    fn the_point_of_a_moving_obstacle_moves_with_its_frame() {
+        let turn = Pose::rotation([0.2, -0.5, 1.0], 30.0, [0.3, 0.1, -0.4]).translated([0.01, -0.02, 0.03]);
+        for cloth_is_first in [true, false] {
+            let (one, [cloth, anchored]) = on_obstacle(cloth_is_first);
+            let start = one.between(&POSITIONS);
+            assert!(start.iter().all(|component| component.abs() < 1e-14), "{start:?}");
+            for (moves_cloth, moves_frame) in [(true, true), (true, false), (false, true)] {
+                let moves = |vertex: usize| if vertex < 3 { moves_cloth } else { moves_frame };
+                let x: Vec<Vector3<f64>> = (0..POSITIONS.len())
+                    .map(|vertex| if moves(vertex) { turn.transform(POSITIONS[vertex]) } else { POSITIONS[vertex] })
+                    .collect();
+                let moved = |point: Vector3<f64>, moves: bool| if moves { turn.transform(point) } else { point };
+                let away = subtract(moved(cloth, moves_cloth), moved(anchored, moves_frame));
+                let sign = if cloth_is_first { 1.0 } else { -1.0 };
+                for (found, away) in one.between(&x).into_iter().zip(away) {
+                    assert!((found - sign * away).abs() < 1e-13, "{cloth_is_first}, {moves_cloth}, {moves_frame}");
+                }
+                // The forces on cloth and frame are opposite.
+                assert!((one.weights.iter().sum::<f64>() - sign).abs() < 1e-14);
+                let carried: f64 = one.anchor.unwrap().weights.iter().sum();
+                assert!((carried + sign).abs() < 1e-13, "{carried}");
+            }
+        }
+    }
+}

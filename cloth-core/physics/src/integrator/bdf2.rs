@@ -110,3 +110,47 @@ fn extrapolated(here: &[Vector3<f64>], before: &[Vector3<f64>]) -> Vec<Vector3<f
     };
     here.iter().zip(before).map(one).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use energy_elements::HookeSpring;
+    use energy_solve::{ElementList, PotentialTerm, State, System};
+
+    use super::*;
+
+    /// A vertex that a spring ties to a pin, which moves, and one that flies freely.
+    fn body() -> Body {
+        let spring = ElementList::new("spring", vec![HookeSpring::new(40.0, 0.8)], &[[0, 1]]).unwrap();
+        let system = System::new(vec![Box::new(PotentialTerm::new(spring))], &[true, false, false]).unwrap();
+        let x = vec![[0.0; 3], [1.0, 0.2, 0.0], [0.0, 0.0, 5.0]];
+        Body { x, v: vec![[0.1, 0.0, -0.2], [0.0, 0.3, 0.1], [1.0, -2.0, 0.5]], masses: vec![1.0, 2.0, 3.0], system }
+    }
+
+    #[test]
+    fn steps_solve_the_equations_of_the_backward_differentiation_formula() {
+        let (mut body, mut scheme, dt) = (body(), Bdf2::default(), 0.02);
+        let start = Substep::of(&body);
+        let mut states = Vec::new();
+        for step in 1..=6 {
+            states.push(Substep::of(&body));
+            scheme.step(&mut body, dt).unwrap();
+            for vertex in [0, 2] {
+                for axis in 0..3 {
+                    let expected = start.x[vertex][axis] + f64::from(step) * dt * start.v[vertex][axis];
+                    assert!((body.x[vertex][axis] - expected).abs() < 1e-13, "step {step}: vertex {vertex}");
+                }
+            }
+            let [.., before, here] = &states[..] else { continue };
+            let (x, v) = (body.x.clone(), body.v.clone());
+            let force = body.system.forces(State { x: &x, v: &v }).unwrap();
+            for axis in 0..3 {
+                // y' = (4 y − y₋₁)/3 + ⅔ h ẏ', for positions and velocities.
+                let next = |here: f64, before: f64, rate: f64| (4.0 * here - before) / 3.0 + 2.0 / 3.0 * dt * rate;
+                let x = next(here.x[1][axis], before.x[1][axis], body.v[1][axis]);
+                let v = next(here.v[1][axis], before.v[1][axis], force[1][axis] / body.masses[1]);
+                let [x_error, v_error] = [body.x[1][axis] - x, body.v[1][axis] - v].map(f64::abs);
+                assert!(x_error < 1e-14 && v_error < 1e-6, "step {step}: {x_error:e} m, {v_error:e} m/s");
+            }
+        }
+    }
+}

@@ -1,7 +1,7 @@
 use energy_dsl::Vector3;
 use energy_solve::{
-    BlockJacobi, BlockMatrix, Curvature, EvaluationError, LinearisationOptions, SolveOptions, SolveReport, State,
-    StopReason, Weights, bicgstab,
+    BlockMatrix, Curvature, EvaluationError, LinearisationOptions, SolveOptions, SolveReport, State, StopReason,
+    Weights, bicgstab,
 };
 
 use super::linear_solver::{LinearSolver, LinearSolverChoice, SolvedBy};
@@ -80,9 +80,9 @@ impl ImplicitEuler {
         let options = &self.options.0;
         let unsymmetric = |report| (report, SolvedBy::default());
         let (report, solved_by) = match solver {
-            None => unsymmetric(bicgstab(matrix, &BlockJacobi::new(matrix)?, &rhs, &mut delta, options)),
+            None => unsymmetric(bicgstab(matrix, &rhs, &mut delta, options)?),
             Some(solver) => match solver.prepare(matrix, &[], &self.trial) {
-                Ok(()) => solver.solve(matrix, &rhs, &mut delta, options, &mut self.trial),
+                Ok(()) => solver.solve(&rhs, &mut delta, options, &mut self.trial),
                 // A diagonal block with negative curvature proves that the matrix is indefinite.
                 Err(_) if curvature == Curvature::Exact => unsymmetric(SolveReport::indefinite()),
                 Err(error) => return Err(error),

@@ -2,8 +2,7 @@ use std::sync::Arc;
 
 use energy_dsl::Vector3;
 use energy_solve::{
-    BlockCholesky, BlockMatrix, Contact, IncompleteCholesky, Multigrid, OverRelaxation, Pattern, Precision,
-    SolveOptions, SolveReport, conjugate_gradients,
+    BlockCholesky, BlockMatrix, Contact, Multigrid, OverRelaxation, Pattern, Precision, SolveOptions, SolveReport,
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -16,7 +15,7 @@ use super::trial::Trial;
 #[serde(rename_all = "kebab-case")]
 pub enum LinearSolverChoice {
     /// For sheets, over-relaxation, or multigrid once over-relaxation needs too many iterations. For strands,
-    /// incomplete Cholesky.
+    /// Cholesky.
     #[default]
     Auto,
     /// Conjugate gradients with symmetric over-relaxation.
@@ -25,14 +24,11 @@ pub enum LinearSolverChoice {
     Multigrid,
     /// Sparse Cholesky factorisation of every matrix.
     Cholesky,
-    /// Conjugate gradients with an incomplete Cholesky factorisation.
-    IncompleteCholesky,
 }
 
 impl LinearSolverChoice {
     /// All choices, `Auto` first.
-    pub const ALL: [Self; 5] =
-        [Self::Auto, Self::OverRelaxation, Self::Multigrid, Self::Cholesky, Self::IncompleteCholesky];
+    pub const ALL: [Self; 4] = [Self::Auto, Self::OverRelaxation, Self::Multigrid, Self::Cholesky];
 
     /// The name in scene files.
     #[must_use]
@@ -42,7 +38,6 @@ impl LinearSolverChoice {
             Self::OverRelaxation => "over-relaxation",
             Self::Multigrid => "multigrid",
             Self::Cholesky => "cholesky",
-            Self::IncompleteCholesky => "incomplete-cholesky",
         }
     }
 }
@@ -57,8 +52,6 @@ pub struct SolvedBy {
     pub multigrid: u64,
     /// Solves by [`BlockCholesky`].
     pub cholesky: u64,
-    /// Solves by [`IncompleteCholesky`].
-    pub incomplete_cholesky: u64,
     /// The largest number of multigrid levels, including the finest.
     pub levels: usize,
     /// The largest operator complexity: blocks of all levels over blocks of the finest.
@@ -70,7 +63,6 @@ impl std::ops::AddAssign for SolvedBy {
         self.over_relaxation += other.over_relaxation;
         self.multigrid += other.multigrid;
         self.cholesky += other.cholesky;
-        self.incomplete_cholesky += other.incomplete_cholesky;
         self.levels = self.levels.max(other.levels);
         self.complexity = self.complexity.max(other.complexity);
     }
@@ -79,12 +71,8 @@ impl std::ops::AddAssign for SolvedBy {
 /// Such as `multigrid 97 (4 levels, complexity 1.08), over-relaxation 3`.
 impl std::fmt::Display for SolvedBy {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let named = [
-            ("multigrid", self.multigrid),
-            ("over-relaxation", self.over_relaxation),
-            ("Cholesky", self.cholesky),
-            ("incomplete Cholesky", self.incomplete_cholesky),
-        ];
+        let named =
+            [("multigrid", self.multigrid), ("over-relaxation", self.over_relaxation), ("Cholesky", self.cholesky)];
         let mut separator = "";
         for (name, count) in named.into_iter().filter(|(_, count)| *count > 0) {
             write!(f, "{separator}{name} {count}")?;
@@ -113,7 +101,6 @@ enum Solver<T> {
     OverRelaxation(Box<OverRelaxation<T>>),
     Multigrid(Box<Multigrid<T>>),
     Cholesky(Box<BlockCholesky>),
-    IncompleteCholesky(Box<IncompleteCholesky>),
 }
 
 impl<T: Precision> Solver<T> {
@@ -122,7 +109,6 @@ impl<T: Precision> Solver<T> {
         Ok(match choice {
             LinearSolverChoice::Multigrid => Self::Multigrid(Multigrid::with_threads(pattern, threads).into()),
             LinearSolverChoice::Cholesky => Self::Cholesky(BlockCholesky::new(pattern)?.into()),
-            LinearSolverChoice::IncompleteCholesky => Self::IncompleteCholesky(IncompleteCholesky::new(pattern).into()),
             LinearSolverChoice::Auto | LinearSolverChoice::OverRelaxation => {
                 Self::OverRelaxation(OverRelaxation::with_threads(pattern, threads).into())
             }
@@ -134,7 +120,6 @@ impl<T: Precision> Solver<T> {
             Self::OverRelaxation(_) => LinearSolverChoice::OverRelaxation,
             Self::Multigrid(_) => LinearSolverChoice::Multigrid,
             Self::Cholesky(_) => LinearSolverChoice::Cholesky,
-            Self::IncompleteCholesky(_) => LinearSolverChoice::IncompleteCholesky,
         }
     }
 }
@@ -149,10 +134,10 @@ impl<T: Precision> Clone for LinearSolver<T> {
 impl<T: Precision> LinearSolver<T> {
     /// Creates a solver for matrices with the pattern of this one, with at most `threads` threads.
     pub(super) fn new(choice: LinearSolverChoice, matrix: &BlockMatrix<impl Precision>, threads: usize) -> Self {
-        // If elimination causes no fill-in, as on strands, the incomplete factorisation is exact. Relaxation would
-        // propagate changes by a few vertices per iteration only.
+        // If elimination causes no fill-in, as on strands, a factorisation is cheap. Relaxation would propagate changes
+        // by a few vertices per iteration only.
         let choice = match choice {
-            LinearSolverChoice::Auto if !matrix.pattern().fills_in() => LinearSolverChoice::IncompleteCholesky,
+            LinearSolverChoice::Auto if !matrix.pattern().fills_in() => LinearSolverChoice::Cholesky,
             choice => choice,
         };
         Self { choice, threads, in_contact: false, solver: None }
@@ -181,7 +166,6 @@ impl<T: Precision> LinearSolver<T> {
             Solver::OverRelaxation(solver) => solver.scale_with_contacts(matrix, contacts)?,
             Solver::Multigrid(solver) => solver.take_over(matrix)?,
             Solver::Cholesky(solver) => solver.factor(matrix)?,
-            Solver::IncompleteCholesky(solver) => solver.factor(matrix)?,
         }
         Ok(())
     }
@@ -189,7 +173,6 @@ impl<T: Precision> LinearSolver<T> {
     /// Solves A x = b from x = 0, where A is the prepared matrix, and records the iterations in `trial`.
     pub(super) fn solve(
         &mut self,
-        matrix: &BlockMatrix<impl Precision>,
         b: &[Vector3<f64>],
         x: &mut [Vector3<f64>],
         options: &SolveOptions,
@@ -209,11 +192,6 @@ impl<T: Precision> LinearSolver<T> {
             Solver::Cholesky(solver) => {
                 solved_by.cholesky = 1;
                 solver.solve(b, x)
-            }
-            Solver::IncompleteCholesky(solver) => {
-                solved_by.incomplete_cholesky = 1;
-                x.fill([0.0; 3]);
-                conjugate_gradients(matrix, &**solver, b, x, options)
             }
         };
         if self.choice == LinearSolverChoice::Auto && !self.in_contact && report.converged() {

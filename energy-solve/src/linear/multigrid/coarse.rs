@@ -2,17 +2,17 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use energy_dsl::{Kernel, Level, Vector3, dispatch};
-use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use super::galerkin::GalerkinProduct;
 use super::interpolation::Interpolation;
 use super::smoother::{Inversion, Smoother};
 use crate::linear::domains::{InverseFactor, Precision, Scaling, Wide, create_domains, scaled, unscaled};
+use crate::linear::sparse_factor::SparseFactor;
 use crate::matrix::block_matrix::BlockMatrix;
 use crate::matrix::pattern::Pattern;
 use crate::matrix::vector::widened;
 
-/// The largest number of rows of the coarsest level, which is factored as a dense matrix. Levels whose rows cannot be
+/// The largest number of rows of the coarsest level, which is factored. Levels whose rows cannot be
 /// aggregated further may be larger.
 const COARSEST: usize = 24;
 
@@ -32,7 +32,7 @@ pub(super) struct Coarse<T> {
 
 #[derive(Clone, Debug)]
 enum Inverse<T> {
-    Dense(Option<Cholesky<f64, Dyn>>),
+    Direct(Box<SparseFactor>),
     Cycle(Box<Relaxed<T>>),
 }
 
@@ -61,7 +61,7 @@ impl<T: Precision> Coarse<T> {
         let rows = product.pattern().rows();
         let zeros = vec![[T::from_f64(0.0); 4]; rows];
         let inverse = if rows <= COARSEST {
-            Inverse::Dense(None)
+            Inverse::Direct(SparseFactor::new(3, product.pattern()).ok()?.into())
         } else {
             Inverse::Cycle(Box::new(Relaxed::new(product.pattern())))
         };
@@ -83,11 +83,8 @@ impl<T: Precision> Coarse<T> {
     pub(super) fn take_over(&mut self, fine: &BlockMatrix<impl Precision>, unit: f64, threads: usize) -> Option<()> {
         let matrix = self.product.compute(fine, &self.interpolation, threads);
         match &mut self.inverse {
-            Inverse::Dense(factor) => {
-                let rows = 3 * matrix.pattern().rows();
-                let entry = |i: usize, j: usize| unit * unit * matrix.block(i / 3, j / 3)[i % 3][j % 3];
-                *factor = Cholesky::new(DMatrix::from_fn(rows, rows, entry));
-                factor.as_ref().map(|_| ())
+            Inverse::Direct(factor) => {
+                factor.factor(0.0, |block, i, j| unit * unit * matrix.values()[block][i][j]).ok()
             }
             Inverse::Cycle(relaxed) => relaxed.take_over(&matrix, unit),
         }
@@ -97,12 +94,11 @@ impl<T: Precision> Coarse<T> {
     /// preconditioning requires.
     pub(super) fn correct(&mut self) {
         match &mut self.inverse {
-            Inverse::Dense(factor) => {
-                let factor = factor.as_ref().expect("`take_over` came first");
+            Inverse::Direct(factor) => {
                 let numbers = self.restricted.iter().flat_map(|&[u, v, w, _]| [u, v, w]).map(Into::into);
-                let mut e = DVector::from_iterator(3 * self.restricted.len(), numbers);
-                factor.solve_mut(&mut e);
-                for (correction, &[u, v, w]) in self.correction.iter_mut().zip(e.as_slice().as_chunks::<3>().0) {
+                let mut e: Vec<f64> = numbers.collect();
+                factor.solve(&mut e);
+                for (correction, &[u, v, w]) in self.correction.iter_mut().zip(e.as_chunks::<3>().0) {
                     *correction = widened([u, v, w]);
                 }
             }

@@ -4,18 +4,13 @@ use energy_dsl::{Kernel, Level, Vector3, dispatch};
 
 use super::coarse::Coarse;
 use super::smoother::Smoother;
+use crate::linear::conjugate_gradients::Steps;
 use crate::linear::domains::{
     InverseFactor, PerDomain, Precision, RightHandScale, Wide, add_products, scaled, sum_of_three, unscaled,
 };
-use crate::linear::solve::{SolveOptions, SolveReport, StopReason};
 use crate::matrix::pattern::Pattern;
 use crate::matrix::vector::widened;
 use crate::threads::SpinBarrier;
-
-/// Factor by which the tolerance may exceed that of over-relaxation. There the remaining error is smooth, and the norm,
-/// which gives smooth parts little weight, is half the relative error of the solution. Here the remaining error is
-/// rough, and the norm slightly exceeds the relative error.
-const ROUGHNESS: f64 = 2.0;
 
 /// A domain's part of the vectors of conjugate gradients.
 #[derive(Clone, Debug)]
@@ -53,7 +48,6 @@ impl<T: Precision> Vectors<T> {
 /// Data shared by all threads that solve a system.
 pub(super) struct Common<'a, T> {
     pub(super) pattern: &'a Pattern,
-    pub(super) options: &'a SolveOptions,
     pub(super) smoothers: &'a [Smoother<T>],
     pub(super) coarse: Option<RwLock<&'a mut Coarse<T>>>,
     /// The border rows of s, then of e, for each domain.
@@ -70,12 +64,7 @@ pub(super) struct Common<'a, T> {
 }
 
 impl<'a, T: Precision> Common<'a, T> {
-    pub(super) fn new(
-        pattern: &'a Pattern,
-        options: &'a SolveOptions,
-        smoothers: &'a [Smoother<T>],
-        coarse: Option<&'a mut Coarse<T>>,
-    ) -> Self {
+    pub(super) fn new(pattern: &'a Pattern, smoothers: &'a [Smoother<T>], coarse: Option<&'a mut Coarse<T>>) -> Self {
         let zeros = |length: usize| RwLock::new(vec![[T::from_f64(0.0); 4]; length]);
         let span = |smoother: &Smoother<T>| match &coarse {
             Some(coarse) => coarse.interpolation.span(smoother.triangle.rows.clone()),
@@ -86,7 +75,6 @@ impl<'a, T: Precision> Common<'a, T> {
         let sum = || PerDomain::new(smoothers.len());
         Self {
             pattern,
-            options,
             smoothers,
             borders: borders(),
             changes: borders(),
@@ -132,75 +120,72 @@ pub(super) struct Part<'a, T> {
     pub(super) x: &'a mut [Vector3<f64>],
 }
 
-/// Runs conjugate gradients in one of the threads. [`super::Multigrid`] documents the formulas.
-pub(super) fn conjugate_gradients<T: Precision>(
-    mut parts: Vec<Part<'_, T>>,
-    common: &Common<'_, T>,
-    barrier: &SpinBarrier,
-) -> SolveReport {
-    let Common { options, right_hand_scale, square, along, curvature, .. } = common;
-    let leads = parts.iter().any(|part| part.number == 0);
-    for Part { number, inverses, b, .. } in &parts {
-        right_hand_scale.note(*number, inverses, b);
+/// The steps of conjugate gradients in one of the threads. [`super::Multigrid`] documents the formulas.
+pub(super) struct Gradients<'a, 'c, T> {
+    pub(super) parts: Vec<Part<'a, T>>,
+    pub(super) common: &'a Common<'c, T>,
+    pub(super) barrier: &'a SpinBarrier,
+}
+
+impl<T: Precision> Steps for Gradients<'_, '_, T> {
+    fn start(&mut self) -> (f64, f64) {
+        let Self { parts, common, barrier } = self;
+        let Common { right_hand_scale, square, .. } = common;
+        for Part { number, inverses, b, .. } in &*parts {
+            right_hand_scale.note(*number, inverses, b);
+        }
+        barrier.wait();
+        let scale = right_hand_scale.combined();
+        for part in parts {
+            square.put(part.number, dispatch(Start { part, common, scale }));
+        }
+        barrier.wait();
+        (scale, square.sum())
     }
-    barrier.wait();
-    let scale = right_hand_scale.combined();
-    for part in &mut parts {
-        square.put(part.number, dispatch(Start { part, common, scale }));
-    }
-    barrier.wait();
-    let mut sigma = square.sum();
-    let initial = sigma;
-    let target = (ROUGHNESS * options.relative_tolerance).powi(2) * initial;
-    let mut rho = 0.0;
-    let mut iterations = 0;
-    let stopped = loop {
-        if !sigma.is_finite() || !scale.is_finite() {
-            break StopReason::NonFinite;
-        }
-        if sigma <= target {
-            break StopReason::Converged;
-        }
-        if iterations == options.iteration_limit {
-            break StopReason::IterationLimit;
-        }
-        for part in &mut parts {
+
+    fn precondition(&mut self, _: f64) -> f64 {
+        let Self { parts, common, barrier } = self;
+        for part in &mut *parts {
             dispatch(Restriction { part, common });
         }
         barrier.wait();
-        if leads {
+        if parts.iter().any(|part| part.number == 0) {
             common.correct();
         }
         barrier.wait();
-        for part in &mut parts {
-            along.put(part.number, dispatch(Correction { part, common }));
+        for part in parts {
+            common.along.put(part.number, dispatch(Correction { part, common }));
         }
         barrier.wait();
-        let previous = std::mem::replace(&mut rho, along.sum());
-        let conjugate = if iterations == 0 { 0.0 } else { rho / previous };
-        for part in &mut parts {
-            curvature.put(part.number, dispatch(Conjugation { part, common, conjugate }));
+        common.along.sum()
+    }
+
+    fn conjugate(&mut self, ratio: f64) -> f64 {
+        let Self { parts, common, barrier } = self;
+        for part in parts {
+            common.curvature.put(part.number, dispatch(Conjugation { part, common, ratio }));
         }
         barrier.wait();
-        let bends = curvature.sum();
-        if rho <= 0.0 || bends <= 0.0 {
-            break StopReason::IndefiniteCurvature;
-        }
-        for part in &mut parts {
-            square.put(part.number, dispatch(Advance { part, common, step: rho / bends }));
+        common.curvature.sum()
+    }
+
+    fn advance(&mut self, step: f64) -> f64 {
+        let Self { parts, common, barrier } = self;
+        for part in parts {
+            common.square.put(part.number, dispatch(Advance { part, common, step }));
         }
         barrier.wait();
-        sigma = square.sum();
-        iterations += 1;
-    };
-    for Part { vectors, inverses, x, .. } in &mut parts {
-        for row in 0..x.len() {
-            let [u, v, w, _] = vectors.solution[row].map(|component| Into::<f64>::into(component) * scale);
-            x[row] = unscaled(&inverses[row], &[u, v, w]);
+        common.square.sum()
+    }
+
+    fn finish(&mut self, unit: f64) {
+        for Part { vectors, inverses, x, .. } in &mut self.parts {
+            for row in 0..x.len() {
+                let [u, v, w, _] = vectors.solution[row].map(|component| Into::<f64>::into(component) * unit);
+                x[row] = unscaled(&inverses[row], &[u, v, w]);
+            }
         }
     }
-    let [initial_residual, final_residual] = [initial, sigma / ROUGHNESS.powi(2)].map(|square| square.sqrt() * scale);
-    SolveReport { iterations, initial_residual, final_residual, stopped }
 }
 
 /// r ← C⁻¹ b/s, s ← (I + L̃)⁻¹ r, other vectors ← 0. Returns s · s.
@@ -334,7 +319,7 @@ impl<T: Precision> Kernel for Correction<'_, '_, '_, T> {
 struct Conjugation<'a, 'b, 'c, T> {
     part: &'a mut Part<'b, T>,
     common: &'a Common<'c, T>,
-    conjugate: f64,
+    ratio: f64,
 }
 
 impl<T: Precision> Kernel for Conjugation<'_, '_, '_, T> {
@@ -346,12 +331,12 @@ impl<T: Precision> Kernel for Conjugation<'_, '_, '_, T> {
         let Part { number, vectors, .. } = self.part;
         let smoother = &smoothers[*number];
         let Vectors { residual, smoothed, direction, product, forward_product, change, back, .. } = &mut **vectors;
-        let conjugate = T::from_f64(self.conjugate);
+        let ratio = T::from_f64(self.ratio);
         for row in 0..product.len() {
             let (mut p, mut q) = (direction[row], product[row]);
             for lane in 0..4 {
-                p[lane] = p[lane].mul_add::<L>(conjugate, smoothed[row][lane] + back[row][lane]);
-                q[lane] = q[lane].mul_add::<L>(conjugate, residual[row][lane]);
+                p[lane] = p[lane].mul_add::<L>(ratio, smoothed[row][lane] + back[row][lane]);
+                q[lane] = q[lane].mul_add::<L>(ratio, residual[row][lane]);
             }
             (direction[row], product[row]) = (p, q);
         }

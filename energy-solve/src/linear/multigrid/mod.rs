@@ -9,14 +9,19 @@ use std::sync::Arc;
 use energy_dsl::{Number, Vector3, dispatch};
 
 use self::coarse::Coarse;
-use self::gradients::{Common, Part, Vectors, conjugate_gradients};
+use self::gradients::{Common, Gradients, Part, Vectors};
 use self::smoother::{Inversion, Smoother};
+use crate::linear::conjugate_gradients::conjugate_gradients;
 use crate::linear::domains::{InverseFactor, Precision, Scaling, create_domains, ranges};
-use crate::linear::preconditioner::SingularBlock;
-use crate::linear::solve::{SolveOptions, SolveReport, StopReason};
+use crate::linear::solve::{SingularBlock, SolveOptions, SolveReport, StopReason};
 use crate::matrix::block_matrix::BlockMatrix;
 use crate::matrix::pattern::{Pattern, Storage};
 use crate::threads::{for_each, in_parts, split_mut};
+
+/// Factor by which the tolerance may exceed that of over-relaxation. There the remaining error is smooth, and the norm,
+/// which gives smooth parts little weight, is half the relative error of the solution. Here the remaining error is
+/// rough, and the norm slightly exceeds the relative error.
+const ROUGHNESS: f64 = 2.0;
 
 /// Conjugate gradients preconditioned by smoothed aggregation multigrid, for matrices of cloth. The number of
 /// iterations hardly depends on the resolution of the mesh (Tamstorf, Jones and McCormick, "Smoothed aggregation
@@ -165,15 +170,20 @@ impl<T: Precision> Multigrid<T> {
             return SolveReport::indefinite();
         }
         let Self { pattern, threads, inverses, smoothers, vectors, coarse, .. } = self;
-        let common = Common::new(pattern, options, smoothers, coarse.as_mut());
+        let common = Common::new(pattern, smoothers, coarse.as_mut());
         let lengths = smoothers.iter().map(|smoother| smoother.triangle.rows.len());
         let parts = vectors.iter_mut().zip(split_mut(x, lengths)).enumerate();
         let parts = parts.map(|(number, (vectors, x))| {
             let rows = smoothers[number].triangle.rows.clone();
             Part { number, vectors, inverses: &inverses[rows.clone()], b: &b[rows], x }
         });
-        let solved = in_parts(*threads, parts.collect(), |parts, barrier| conjugate_gradients(parts, &common, barrier));
+        let relative_tolerance = ROUGHNESS * options.relative_tolerance;
+        let options = SolveOptions { relative_tolerance, ..*options };
+        let solved = in_parts(*threads, parts.collect(), |parts, barrier| {
+            conjugate_gradients(&mut Gradients { parts, common: &common, barrier }, &options)
+        });
         // All threads return the same report.
-        solved.into_iter().next().unwrap_or(nothing)
+        let report = solved.into_iter().next().unwrap_or(nothing);
+        SolveReport { final_residual: report.final_residual / ROUGHNESS, ..report }
     }
 }

@@ -1,5 +1,6 @@
 mod domain;
 
+use std::marker::PhantomData;
 use std::ops::Range;
 use std::sync::{Arc, RwLock};
 
@@ -7,12 +8,12 @@ use energy_dsl::{Block, Kernel, Level, Vector3, dispatch};
 
 use self::domain::Domain;
 use crate::contact::Contact;
+use crate::linear::conjugate_gradients::{Steps, conjugate_gradients};
 use crate::linear::domains::{
     InverseFactor, PerDomain, Precision, RightHandScale, Scaling, Wide, contact_diagonals, create_domains, distribute,
     invert, ranges,
 };
-use crate::linear::preconditioner::SingularBlock;
-use crate::linear::solve::{SolveOptions, SolveReport, StopReason};
+use crate::linear::solve::{SingularBlock, SolveOptions, SolveReport, StopReason};
 use crate::matrix::block_matrix::BlockMatrix;
 use crate::matrix::pattern::{Pattern, Storage};
 use crate::threads::{SpinBarrier, for_each, in_parts, split_mut};
@@ -232,60 +233,70 @@ impl<T: Precision> Kernel for Gradients<'_, T> {
 
     #[inline(always)]
     fn run<L: Level>(self) -> SolveReport {
-        let Self { mut parts, common, barrier } = self;
-        let Common { pattern, options, borders, contact_borders, right_hand_scale, .. } = common;
-        let Common { first_half, second_half, square, .. } = common;
-        for Part { number, inverses, b, .. } in &parts {
+        let options = self.common.options;
+        conjugate_gradients(&mut AtLevel { gradients: self, level: PhantomData::<L> }, options)
+    }
+}
+
+/// The steps of one thread at a SIMD level. r is its own preconditioned residual, since the matrix is.
+struct AtLevel<'a, T, L> {
+    gradients: Gradients<'a, T>,
+    level: PhantomData<L>,
+}
+
+impl<T: Precision, L: Level> Steps for AtLevel<'_, T, L> {
+    #[inline(always)]
+    fn start(&mut self) -> (f64, f64) {
+        let Gradients { parts, common, barrier } = &mut self.gradients;
+        let Common { pattern, right_hand_scale, square, .. } = common;
+        for Part { number, inverses, b, .. } in &*parts {
             right_hand_scale.note(*number, inverses, b);
         }
         barrier.wait();
         let scale = right_hand_scale.combined();
-        for Part { number, domain, inverses, b, .. } in &mut parts {
+        for Part { number, domain, inverses, b, .. } in parts {
             square.put(*number, domain.start::<L>(pattern, inverses, b, scale));
         }
         barrier.wait();
-        let mut rho = square.sum();
-        let initial = rho;
-        let target = options.relative_tolerance.powi(2) * initial;
-        let mut conjugate = 0.0;
-        let mut iterations = 0;
-        let stopped = loop {
-            if !rho.is_finite() || !scale.is_finite() {
-                break StopReason::NonFinite;
-            }
-            if rho <= target {
-                break StopReason::Converged;
-            }
-            if iterations == options.iteration_limit {
-                break StopReason::IterationLimit;
-            }
-            for Part { number, domain, .. } in &mut parts {
-                let (border, contact_border) = (&borders[*number], contact_borders.get(*number));
-                first_half.put(*number, domain.backward::<L>(pattern, conjugate, border, contact_border));
-            }
-            barrier.wait();
-            for Part { number, domain, .. } in &mut parts {
-                domain.couple::<L>(borders, contact_borders);
-                second_half.put(*number, domain.forward::<L>(pattern));
-            }
-            barrier.wait();
-            let along = first_half.sum() + second_half.sum();
-            if along <= 0.0 {
-                break StopReason::IndefiniteCurvature;
-            }
-            let previous = rho;
-            for Part { number, domain, .. } in &mut parts {
-                square.put(*number, domain.advance::<L>(rho / along));
-            }
-            barrier.wait();
-            rho = square.sum();
-            conjugate = rho / previous;
-            iterations += 1;
-        };
-        for Part { domain, inverses, x, .. } in &mut parts {
-            domain.finish(inverses, scale, x);
+        (scale, square.sum())
+    }
+
+    #[inline(always)]
+    fn precondition(&mut self, square: f64) -> f64 {
+        square
+    }
+
+    #[inline(always)]
+    fn conjugate(&mut self, ratio: f64) -> f64 {
+        let Gradients { parts, common, barrier } = &mut self.gradients;
+        let Common { pattern, borders, contact_borders, first_half, second_half, .. } = common;
+        for Part { number, domain, .. } in &mut *parts {
+            let (border, contact_border) = (&borders[*number], contact_borders.get(*number));
+            first_half.put(*number, domain.backward::<L>(pattern, ratio, border, contact_border));
         }
-        let [initial_residual, final_residual] = [initial, rho].map(|square| square.sqrt() * scale);
-        SolveReport { iterations, initial_residual, final_residual, stopped }
+        barrier.wait();
+        for Part { number, domain, .. } in parts {
+            domain.couple::<L>(borders, contact_borders);
+            second_half.put(*number, domain.forward::<L>(pattern));
+        }
+        barrier.wait();
+        first_half.sum() + second_half.sum()
+    }
+
+    #[inline(always)]
+    fn advance(&mut self, step: f64) -> f64 {
+        let Gradients { parts, common, barrier } = &mut self.gradients;
+        for Part { number, domain, .. } in parts {
+            common.square.put(*number, domain.advance::<L>(step));
+        }
+        barrier.wait();
+        common.square.sum()
+    }
+
+    #[inline(always)]
+    fn finish(&mut self, unit: f64) {
+        for Part { domain, inverses, x, .. } in &mut self.gradients.parts {
+            domain.finish(inverses, unit, x);
+        }
     }
 }

@@ -1,5 +1,7 @@
 //! The elimination order, and the rows of each column of the factor.
 
+use crate::matrix::pattern::Pattern;
+
 /// An elimination order of groups, and the pattern of the factor.
 pub(super) struct Elimination {
     /// Position of each group.
@@ -10,23 +12,23 @@ pub(super) struct Elimination {
 
 impl Elimination {
     /// Orders the groups of a symmetric pattern by approximate minimum degree (Amestoy, Davis and Duff, SIAM J. Matrix
-    /// Anal. Appl. 17, 1996), then so that subtrees of the elimination tree are consecutive. The upper triangle is
-    /// given by rows.
-    pub fn new(rows: &[usize], columns: &[usize]) -> Self {
-        let by_degree = minimum_degree(rows, columns);
-        let parents = tree(&neighbours(rows, columns, &by_degree, Side::Before));
+    /// Anal. Appl. 17, 1996), then so that subtrees of the elimination tree are consecutive.
+    pub fn new(pattern: &Pattern) -> Self {
+        let by_degree = minimum_degree(pattern);
+        let parents = tree(&neighbours(pattern, &by_degree, Side::Before));
         let later = postorder(&parents);
         let positions: Vec<usize> = by_degree.into_iter().map(|position| later[position]).collect();
-        let structure = structure(neighbours(rows, columns, &positions, Side::After));
+        let structure = structure(neighbours(pattern, &positions, Side::After));
         Self { positions, structure }
     }
 }
 
 /// Returns the position of each group in an approximate minimum degree order.
-fn minimum_degree(rows: &[usize], columns: &[usize]) -> Vec<usize> {
-    let signed = |values: &[usize]| -> Vec<isize> { values.iter().map(|&value| value as isize).collect() };
-    let groups = rows.len() - 1;
-    match amd::order(groups as isize, &signed(rows), &signed(columns), &amd::Control::default()) {
+fn minimum_degree(pattern: &Pattern) -> Vec<usize> {
+    let groups = pattern.rows();
+    let starts: Vec<isize> = (0..=groups).map(|row| pattern.first_in(row) as isize).collect();
+    let columns: Vec<isize> = pattern.columns().iter().map(|&column| column as isize).collect();
+    match amd::order(groups as isize, &starts, &columns, &amd::Control::default()) {
         Ok((_, positions, _)) => positions.into_iter().map(|position| position as usize).collect(),
         // Only patterns with indices out of range are refused.
         Err(status) => unreachable!("the pattern of a matrix is valid: {status:?}"),
@@ -41,10 +43,10 @@ enum Side {
 }
 
 /// Returns the neighbours of each position on one side.
-fn neighbours(rows: &[usize], columns: &[usize], positions: &[usize], side: Side) -> Vec<Vec<usize>> {
+fn neighbours(pattern: &Pattern, positions: &[usize], side: Side) -> Vec<Vec<usize>> {
     let mut lists = vec![Vec::new(); positions.len()];
     for row in 0..positions.len() {
-        for &column in &columns[rows[row]..rows[row + 1]] {
+        for (_, column) in pattern.row(row) {
             let (a, b) = (positions[row], positions[column]);
             let (early, late) = (a.min(b), a.max(b));
             match side {
@@ -130,14 +132,15 @@ fn structure(after: Vec<Vec<usize>>) -> Vec<Vec<usize>> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::matrix::pattern::Storage;
 
     /// Two paths that meet: 0 – 1 – 4 – 3 – 2, and an isolated group 5.
-    const ROWS: [usize; 7] = [0, 2, 4, 6, 8, 9, 10];
-    const COLUMNS: [usize; 10] = [0, 1, 1, 4, 2, 3, 3, 4, 4, 5];
+    const LINKS: [[u32; 2]; 4] = [[0, 1], [1, 4], [2, 3], [3, 4]];
 
     #[test]
     fn an_order_visits_each_group_once_and_makes_no_fill_on_a_path() {
-        let Elimination { positions, structure } = Elimination::new(&ROWS, &COLUMNS);
+        let pattern = Pattern::from_stencils(Storage::Upper, 6, LINKS.iter().map(<[u32; 2]>::as_slice));
+        let Elimination { positions, structure } = Elimination::new(&pattern);
         let mut sorted = positions.clone();
         sorted.sort_unstable();
         assert_eq!(sorted, [0, 1, 2, 3, 4, 5]);

@@ -6,6 +6,7 @@ mod supernodes;
 
 use energy_dsl::{Kernel, Level, dispatch};
 
+use crate::matrix::pattern::{Pattern, Storage};
 use elimination::Elimination;
 use panel::{Panel, PanelMut, Product};
 use supernodes::{Supernode, supernodes};
@@ -15,6 +16,7 @@ use supernodes::{Supernode, supernodes};
 /// Unknowns come in groups of equal size, such as the three coordinates of a vertex, whose blocks are dense. Columns of
 /// L with nearly the same rows form a supernode, which is stored as a dense panel. A panel collects the products of the
 /// earlier panels that reach it, and is then factored (Ng and Peyton, SIAM J. Sci. Comput. 14, 1993).
+#[derive(Clone)]
 pub(crate) struct SparseFactor {
     /// Unknowns in a group.
     size: usize,
@@ -54,10 +56,13 @@ impl std::fmt::Debug for SparseFactor {
 }
 
 impl SparseFactor {
-    /// Analyses a pattern of blocks: row `r` of the upper triangle has blocks in the columns
-    /// `columns[rows[r]..rows[r + 1]]`.
-    pub(crate) fn new(size: usize, rows: &[usize], columns: &[usize]) -> Result<Self, OutOfMemory> {
-        let elimination = Elimination::new(rows, columns);
+    /// Analyses the pattern of a matrix whose blocks have `size` rows.
+    ///
+    /// # Panics
+    /// If the pattern does not store an upper triangle.
+    pub(crate) fn new(size: usize, pattern: &Pattern) -> Result<Self, OutOfMemory> {
+        assert_eq!(pattern.storage(), Storage::Upper, "only symmetric matrices have Cholesky factors");
+        let elimination = Elimination::new(pattern);
         let supernodes = supernodes(size, &elimination);
         let positions = elimination.positions;
         let mut owners = vec![0; positions.len()];
@@ -79,10 +84,8 @@ impl SparseFactor {
             let (row, column) = if positions[row] == to && from != to { (1, stride) } else { (stride, 1) };
             BlockPlace { start, row, column }
         };
-        let places = (0..positions.len())
-            .flat_map(|row| columns[rows[row]..rows[row + 1]].iter().map(move |&column| (row, column)))
-            .map(|(row, column)| place(row, column))
-            .collect();
+        let blocks = (0..pattern.rows()).flat_map(|row| pattern.row(row).map(move |(_, column)| (row, column)));
+        let places = blocks.map(|(row, column)| place(row, column)).collect();
         Ok(Self { size, positions, owners, starts, places, entries, supernodes })
     }
 
@@ -211,34 +214,34 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
+    use crate::matrix::pattern::index;
 
     /// A symmetric matrix by blocks of the upper triangle.
     #[derive(Clone, Debug)]
     struct Blocks {
         size: usize,
-        rows: Vec<usize>,
-        columns: Vec<usize>,
+        pattern: Pattern,
         /// Entries of all blocks, row after row.
         values: Vec<f64>,
     }
 
     impl Blocks {
         fn entry(&self, block: usize, i: usize, j: usize) -> f64 {
-            let diagonal = self.rows.contains(&block);
+            let diagonal = self.pattern.diagonals().contains(&index(block));
             let (i, j) = if diagonal { (i.min(j), i.max(j)) } else { (i, j) };
             // Diagonal dominance makes the matrix positive definite.
-            let dominance = if diagonal && i == j { (self.size * self.rows.len()) as f64 } else { 0.0 };
+            let dominance = if diagonal && i == j { (self.size * (self.pattern.rows() + 1)) as f64 } else { 0.0 };
             self.values[(block * self.size + i) * self.size + j] + dominance
         }
 
         fn dense(&self) -> DMatrix<f64> {
-            let unknowns = self.size * (self.rows.len() - 1);
+            let unknowns = self.size * self.pattern.rows();
             let mut dense = DMatrix::zeros(unknowns, unknowns);
-            for row in 0..self.rows.len() - 1 {
-                for block in self.rows[row]..self.rows[row + 1] {
+            for row in 0..self.pattern.rows() {
+                for (block, column) in self.pattern.row(row) {
                     for i in 0..self.size {
                         for j in 0..self.size {
-                            let (at, to) = (self.size * row + i, self.size * self.columns[block] + j);
+                            let (at, to) = (self.size * row + i, self.size * column + j);
                             dense[(at, to)] = self.entry(block, i, j);
                             dense[(to, at)] = self.entry(block, i, j);
                         }
@@ -253,15 +256,13 @@ mod tests {
         (1..=6_usize, 1..=24_usize, 0.0..0.6).prop_flat_map(|(size, groups, density)| {
             let pairs = groups * (groups - 1) / 2;
             prop::collection::vec(0.0..1.0, pairs).prop_flat_map(move |chances| {
-                let mut chances = chances.into_iter();
-                let (mut rows, mut columns) = (vec![0], Vec::new());
-                for row in 0..groups {
-                    columns.push(row);
-                    columns.extend((row + 1..groups).filter(|_| chances.next().is_some_and(|chance| chance < density)));
-                    rows.push(columns.len());
-                }
-                let values = prop::collection::vec(-1.0..1.0, size * size * columns.len());
-                values.prop_map(move |values| Blocks { size, rows: rows.clone(), columns: columns.clone(), values })
+                let all = (0..groups).flat_map(|row| (row + 1..groups).map(move |column| [row, column].map(index)));
+                let linked = all.zip(chances).filter(|(_, chance)| *chance < density).map(|(pair, _)| pair);
+                let links: Vec<[u32; 2]> = linked.collect();
+                let links = links.iter().map(<[u32; 2]>::as_slice);
+                let pattern = Pattern::from_stencils(Storage::Upper, groups, links);
+                let values = prop::collection::vec(-1.0..1.0, size * size * pattern.blocks());
+                values.prop_map(move |values| Blocks { size, pattern: pattern.clone(), values })
             })
         })
     }
@@ -269,7 +270,7 @@ mod tests {
     proptest! {
         #[test]
         fn solutions_agree_with_a_dense_factorisation(blocks in blocks(), damping in 0.0..3.0) {
-            let mut factor = SparseFactor::new(blocks.size, &blocks.rows, &blocks.columns).unwrap();
+            let mut factor = SparseFactor::new(blocks.size, &blocks.pattern).unwrap();
             let dense = blocks.dense();
             let damped = &dense + DMatrix::identity(dense.nrows(), dense.nrows()) * damping;
             let expected = DVector::from_fn(dense.nrows(), |i, _| (i as f64 + 0.5).sin());
@@ -289,7 +290,7 @@ mod tests {
 
         #[test]
         fn a_matrix_is_refused_if_a_dense_factorisation_refuses_it(blocks in blocks(), damping in -80.0..0.0) {
-            let mut factor = SparseFactor::new(blocks.size, &blocks.rows, &blocks.columns).unwrap();
+            let mut factor = SparseFactor::new(blocks.size, &blocks.pattern).unwrap();
             let dense = blocks.dense();
             let least: f64 = dense.symmetric_eigenvalues().min() + damping;
             prop_assume!(least.abs() > 1e-9);
@@ -300,7 +301,7 @@ mod tests {
 
     #[test]
     fn a_matrix_without_rows_has_an_empty_factor() {
-        let mut factor = SparseFactor::new(3, &[0], &[]).unwrap();
+        let mut factor = SparseFactor::new(3, &Pattern::from_stencils(Storage::Upper, 0, [])).unwrap();
         factor.factor(0.0, |_, _, _| 1.0).unwrap();
         factor.solve(&mut []);
         assert_eq!(factor.entries(), 0);

@@ -2,16 +2,15 @@
 
 use std::ops::Range;
 
-use energy_dsl::{Kernel, Level, dispatch};
-use nalgebra::{DMatrixView, DMatrixViewMut, Dyn};
+use energy_dsl::{Kernel, Lane, Level, Number, dispatch};
 
 use super::supernodes::Supernode;
 
 /// Columns that are factored one by one; wider panels are divided.
 const NARROW: usize = 16;
 
-/// Columns of a product that are computed at a time: only their first square has entries above the diagonal.
-const STRIP: usize = 64;
+/// Registers of rows of a product that are computed at a time.
+const REGISTERS: usize = 2;
 
 /// The panel of a factored supernode.
 pub(super) struct Panel<'a> {
@@ -181,21 +180,70 @@ impl Kernel for NarrowFactor<'_> {
 }
 
 /// C ← C − A Bᵀ below the diagonal, where A has the given height and depth, and B is the first `width` rows of A.
-fn subtract_outer(
-    target: &mut [f64],
+fn subtract_outer(target: &mut [f64], target_stride: usize, left: &[f64], stride: usize, sizes: [usize; 3]) {
+    dispatch(OuterProduct { target, target_stride, left, stride, sizes });
+}
+
+/// [`subtract_outer`], in tiles whose sums stay in registers. A strip of rows of A stays in the cache while it meets
+/// all columns.
+struct OuterProduct<'a> {
+    target: &'a mut [f64],
     target_stride: usize,
-    left: &[f64],
+    left: &'a [f64],
     stride: usize,
-    [height, width, depth]: [usize; 3],
-) {
-    for first in (0..width).step_by(STRIP) {
-        let left = &left[first..];
-        let (height, width) = (height - first, STRIP.min(width - first));
-        let a = DMatrixView::<f64, Dyn, Dyn>::from_slice_with_strides(left, height, depth, 1, stride);
-        let b = DMatrixView::<f64, Dyn, Dyn>::from_slice_with_strides(left, depth, width, stride, 1);
-        let c = &mut target[first + first * target_stride..];
-        DMatrixViewMut::<f64, Dyn, Dyn>::from_slice_with_strides_mut(c, height, width, 1, target_stride)
-            .gemm(-1.0, &a, &b, 1.0);
+    sizes: [usize; 3],
+}
+
+impl Kernel for OuterProduct<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<L: Level>(mut self) {
+        let ([height, width, _], rows) = (self.sizes, REGISTERS * L::F64::LANES);
+        for row in (0..height).step_by(rows) {
+            let (mut first, end) = (0, width.min(row + rows));
+            while first < end {
+                // Most columns come in threes: the unknowns of a vertex.
+                first += match width - first {
+                    6.. => self.subtract_tile::<L, 6>(first, row),
+                    3.. => self.subtract_tile::<L, 3>(first, row),
+                    _ => self.subtract_tile::<L, 1>(first, row),
+                };
+            }
+        }
+    }
+}
+
+impl OuterProduct<'_> {
+    /// Subtracts the product from some columns and the rows of some registers. Returns the number of columns.
+    #[inline(always)]
+    fn subtract_tile<L: Level, const COLUMNS: usize>(&mut self, first: usize, row: usize) -> usize {
+        let Self { target, target_stride, left, stride, sizes: [height, _, depth] } = self;
+        // Registers beyond the last row read the last one, and are not stored.
+        let from = |register: usize| (row + register * L::F64::LANES).min(*height - 1);
+        let zero = L::F64::splat(0.0);
+        let mut sums = [[zero; REGISTERS]; COLUMNS];
+        for index in 0..*depth {
+            let source = &left[index * *stride..][..*height];
+            let entries: [L::F64; REGISTERS] =
+                std::array::from_fn(|register| L::F64::load_ragged(&source[from(register)..]));
+            for column in 0..COLUMNS {
+                let factor = L::F64::splat(source[first + column]);
+                for register in 0..REGISTERS {
+                    sums[column][register] = factor.mul_add::<L>(entries[register], sums[column][register]);
+                }
+            }
+        }
+        for (column, sums) in sums.into_iter().enumerate() {
+            let target = &mut target[(first + column) * *target_stride..][..*height];
+            for (register, sum) in sums.into_iter().enumerate() {
+                let place = row + register * L::F64::LANES;
+                if place < *height {
+                    (L::F64::load_ragged(&target[place..]) - sum).store_ragged(&mut target[place..]);
+                }
+            }
+        }
+        COLUMNS
     }
 }
 

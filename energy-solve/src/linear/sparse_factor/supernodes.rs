@@ -5,7 +5,7 @@ use std::ops::Range;
 use super::elimination::Elimination;
 
 /// Consecutive columns of the factor with one list of rows.
-#[derive(Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub(super) struct Supernode {
     /// Its columns, as positions of groups.
     pub columns: Range<usize>,

@@ -1,41 +1,28 @@
-use energy_dsl::{Block, triangle_index};
-use nalgebra::DMatrix;
+use energy_dsl::{Baseline, Block, triangle_index};
 
-use super::Curvature;
-use crate::matrix::vector::transposed;
+use super::square::{AnySquare, Square};
+use super::{Curvature, fill_scaled, jacobi};
 
-/// Projects the symmetric matrix with the given triangle of blocks: for elements whose coordinates are no
-/// independent differences of points, and the reference for all other methods. Returns whether an eigenvalue was changed. A matrix
-/// with a non-finite entry is left unchanged.
+/// Projects the symmetric matrix with the given triangle of blocks: for elements whose coordinates are no independent
+/// differences of points. Returns whether an eigenvalue was changed. A matrix with a non-finite entry is left
+/// unchanged.
 pub fn change_dense(triangle: &mut [Block<f64>], points: usize, curvature: Curvature) -> bool {
     if !triangle.iter().flatten().flatten().all(|entry| entry.is_finite()) {
         return false;
     }
-    let dense = DMatrix::from_fn(3 * points, 3 * points, |row, column| {
-        let (i, j) = (row / 3, column / 3);
-        let block = if i <= j {
-            triangle[triangle_index(points, i, j)]
-        } else {
-            transposed(&triangle[triangle_index(points, j, i)])
-        };
-        block[row % 3][column % 3]
-    });
-    let mut eigen = dense.symmetric_eigen();
-    if eigen.eigenvalues.iter().all(|&value| curvature.change(value) == 0.0) {
+    let n = 3 * points;
+    let entry = |row: usize, column: usize| triangle[triangle_index(points, row / 3, column / 3)][row % 3][column % 3];
+    let upper: Vec<f64> = (0..n).flat_map(|row| (row..n).map(move |column| entry(row, column))).collect();
+    let mut a = AnySquare::zeros_of(n);
+    let scale = fill_scaled(&mut a, &upper);
+    let (difference, changed) = jacobi::difference::<Baseline, f64, _>(&mut a, curvature);
+    if !changed {
         return false;
     }
-    eigen.eigenvalues.iter_mut().for_each(|value| *value += curvature.change(*value));
-    let changed = eigen.recompose();
-    for i in 0..points {
-        for j in i..points {
-            let block = &mut triangle[triangle_index(points, i, j)];
-            for row in 0..3 {
-                for column in 0..3 {
-                    // The mean of both halves keeps diagonal blocks exactly symmetric.
-                    let (r, c) = (3 * i + row, 3 * j + column);
-                    block[row][column] = 0.5 * (changed[(r, c)] + changed[(c, r)]);
-                }
-            }
+    for (i, j) in (0..points).flat_map(|i| (i..points).map(move |j| (i, j))) {
+        let block = &mut triangle[triangle_index(points, i, j)];
+        for (row, column) in (0..3).flat_map(|row| (0..3).map(move |column| (row, column))) {
+            block[row][column] += difference.at(3 * i + row, 3 * j + column) / scale;
         }
     }
     true

@@ -96,6 +96,13 @@ pub(crate) struct Projection<'a> {
 }
 
 impl Projection<'_> {
+    /// Projects the Hessians of all lanes: upper triangles, then vectors, each number for all lanes together. Returns a
+    /// bit mask of the changed lanes.
+    pub(crate) fn change_all<L: Level>(self, numbers: &mut [f64]) -> u32 {
+        let open = u32::MAX >> (32 - <L::F64 as Lane<f64>>::LANES);
+        Indefinite { projection: self, open, numbers }.change(L::NAME)
+    }
+
     /// Projects the Hessians of some elements, as many at a time as there are lanes. `first` returns the place of an
     /// element's first number; its others follow at a `stride`: first those of the upper triangle, then those of the
     /// vectors. Calls `changed` for each element that was changed.
@@ -111,15 +118,6 @@ impl Projection<'_> {
         let mut stored = vec![0.0; (upper + 3 * self.vectors) * lanes];
         for chunk in elements.chunks(lanes) {
             let open = u32::MAX >> (32 - chunk.len());
-            let start = first(chunk[0]);
-            let are_together =
-                stride == lanes && (0..lanes).all(|lane| chunk.get(lane).map(|&e| first(e)) == Some(start + lane));
-            if are_together {
-                let numbers = &mut numbers[start..][..stored.len()];
-                let bits = Indefinite { projection: self, open, numbers }.change(L::NAME);
-                chunk.iter().enumerate().filter(|(lane, _)| bits >> lane & 1 == 1).for_each(|(_, &e)| changed(e));
-                continue;
-            }
             for lane in 0..lanes {
                 // Surplus lanes repeat the last element.
                 let own = numbers[first(chunk[lane.min(chunk.len() - 1)])..].iter().step_by(stride);

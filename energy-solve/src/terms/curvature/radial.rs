@@ -40,3 +40,37 @@ fn form<V: Lane<f64>>(along: V, across: V, d: [V; 3], per_squared: V) -> [V; 6] 
     }
     form
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// f″ n nᵀ + f′/‖d‖ (1 − n nᵀ), the Hessian of f(‖d‖).
+    fn hessian(d: [f64; 3], bend: f64, pull: f64) -> [f64; 6] {
+        let square: f64 = d.iter().map(|component| component * component).sum();
+        let entry = |i: usize, j: usize| {
+            let along = d[i] * d[j] / square;
+            bend * along + pull * (if i == j { 1.0 } else { 0.0 } - along)
+        };
+        [entry(0, 0), entry(0, 1), entry(0, 2), entry(1, 1), entry(1, 2), entry(2, 2)]
+    }
+
+    #[test]
+    fn hessians_of_lengths_are_recognised_and_projected() {
+        let d = [0.3, -1.2, 2.0];
+        for (bend, pull) in [(5.0_f64, 2.0_f64), (5.0, -2.0), (-3.0, 2.0), (-3.0, -2.0)] {
+            for (curvature, [bent, pulled]) in
+                [(Curvature::Clamped, [bend.max(0.0), pull.max(0.0)]), (Curvature::Absolute, [bend.abs(), pull.abs()])]
+            {
+                let (radial, changed) = change(&hessian(d, bend, pull), curvature, d);
+                assert!(radial, "{bend}, {pull}");
+                for (found, expected) in changed.into_iter().zip(hessian(d, bent, pulled)) {
+                    assert!((found - expected).abs() < 1e-14 * 5.0, "{curvature:?} of {bend}, {pull}: {found}");
+                }
+            }
+        }
+        let mut other = hessian(d, 5.0, 2.0);
+        other[4] += 1e-3;
+        assert!(!change(&other, Curvature::Clamped, d).0);
+    }
+}

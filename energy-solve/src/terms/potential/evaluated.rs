@@ -106,7 +106,16 @@ impl<E: PackedPotential<f64>> BatchWork<E> for Hessians<'_, '_> {
         let mut reduced = batch.element.reduced_hessian_at::<L>(batch.points);
         let n = <<E::Wide<L::F64> as ReducedPotential<L::F64>>::Coordinates as Array<L::F64>>::LEN;
         let (derivatives, points) = ((reduced.gradient.as_ref(), reduced.hessian.as_mut()), batch.points.as_ref());
-        let Examined { open, changed } = self.examine::<L>(E::DECLARATION, &lanes, derivatives, n, points);
+        let Examined { mut open, mut changed } = self.examine::<L>(E::DECLARATION, &lanes, derivatives, n, points);
+        let vectors = difference_vectors::<L>(E::DECLARATION, points);
+        if open.count_ones() as usize == <L::F64 as Lane<f64>>::LANES
+            && self.waiting.is_empty()
+            && let Some(projection) = self.projection(E::DECLARATION)
+        {
+            let hessian = reduced.hessian.as_mut();
+            changed |= self.waiting.project_now::<L>(projection, hessian, vectors.as_flattened());
+            open = 0;
+        }
         if open == 0 && self.waiting.is_empty() {
             L::F64::dispatch(Addition::<E, _> { to: self, lanes, reduced: &reduced, changed });
             return;
@@ -114,7 +123,6 @@ impl<E: PackedPotential<f64>> BatchWork<E> for Hessians<'_, '_> {
         let Flags { degenerate, kink } = reduced.flags;
         let Lanes { first, count, .. } = lanes;
         let held = Held { first, count, degenerate: degenerate.bits(), kink: kink.bits(), changed };
-        let vectors = difference_vectors::<L>(E::DECLARATION, points);
         let numbers = [&[reduced.value], reduced.gradient.as_ref(), reduced.hessian.as_ref(), vectors.as_flattened()];
         self.waiting.hold(held, open, (&lanes, points.len()), numbers);
         if self.waiting.is_full(<L::F64 as Lane<f64>>::LANES) {

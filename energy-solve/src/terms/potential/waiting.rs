@@ -39,6 +39,28 @@ pub(super) struct Held {
 }
 
 impl Waiting {
+    /// Projects the Hessians of a batch in which all are indefinite. They need not wait. Returns a bit mask of the
+    /// changed lanes.
+    #[inline(always)]
+    pub(super) fn project_now<L: Level>(
+        &mut self,
+        projection: Projection<'_>,
+        hessian: &mut [L::F64],
+        vectors: &[L::F64],
+    ) -> u32 {
+        let lanes = <L::F64 as Lane<f64>>::LANES;
+        self.numbers.resize((hessian.len() + vectors.len()) * lanes, 0.0);
+        for (number, stored) in hessian.iter().chain(vectors).zip(self.numbers.chunks_exact_mut(lanes)) {
+            number.store(stored);
+        }
+        let changed = projection.change_all::<L>(&mut self.numbers);
+        for (number, stored) in hessian.iter_mut().zip(self.numbers.chunks_exact(lanes)) {
+            *number = L::F64::load(stored);
+        }
+        self.numbers.clear();
+        changed
+    }
+
     pub(super) fn is_empty(&self) -> bool {
         self.batches.is_empty()
     }

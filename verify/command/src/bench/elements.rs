@@ -8,9 +8,9 @@ use energy_elements::{
 
 use verify::sample::Sample;
 
-use super::complex::Complex;
 use super::methods::{Measured, Methods};
 use super::plain;
+use crate::complex::Complex;
 
 /// A function that measures an element by all methods.
 pub(super) type Bench = fn(&Methods<'_>) -> Vec<Measured>;

@@ -13,13 +13,14 @@ use energy_dsl::{
 };
 use serde::Serialize;
 
-use super::complex::Complex;
 use verify::audit::Subject;
 use verify::blocks::BlockName;
 use verify::formula::expected_blocks;
 use verify::geometry::longest_distance;
 use verify::multiprecision::{TrueBlock, truth, worse};
 use verify::sample::Sample;
+
+use crate::complex::Complex;
 
 /// Digits of the method multi-precision.
 const DIGITS: usize = 30;

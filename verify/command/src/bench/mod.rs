@@ -1,7 +1,6 @@
 //! Run time and error of every method of computing a Hessian. Every error is measured: methods in doubles and
 //! multi-precision with 30 digits are compared with 60 digits.
 
-mod complex;
 mod elements;
 mod methods;
 mod plain;

@@ -15,7 +15,7 @@ use serde_json::{Map, Value};
 use super::exact::Truth;
 use super::file::{RecordError, read};
 use super::{fusion_system, smoothing};
-use verify::dual::Hyper;
+use crate::complex::Complex;
 
 /// The error of one array of a family over all cases.
 #[derive(Clone, Debug, Serialize)]
@@ -403,11 +403,11 @@ fn nonrigid(case: &Case<'_>, lines: &mut Lines) -> Result<(), String> {
     if let Ok(truth) = case.out("hess_r") {
         let hessian = match w.len() {
             8 => return Ok(()),
-            1 => second_derivatives(&twists, |x| hyper_plane1(turn, v, n, u).jacobian(&x).jacobian.to_vec())?,
+            1 => second_derivatives(&twists, |x| complex_plane1(turn, v, n, u).jacobian(&x).jacobian.to_vec())?,
             _ => {
                 let w = fixed::<4>(&w, "w")?;
-                second_derivatives(&twists, |x: [Hyper; 24]| {
-                    hyper_plane4(turn, w, v, n, u).jacobian(&x).jacobian.to_vec()
+                second_derivatives(&twists, |x: [Complex; 24]| {
+                    complex_plane4(turn, w, v, n, u).jacobian(&x).jacobian.to_vec()
                 })?
             }
         };
@@ -416,25 +416,26 @@ fn nonrigid(case: &Case<'_>, lines: &mut Lines) -> Result<(), String> {
     Ok(())
 }
 
-fn hyper_plane1(turn: f64, v: [f64; 3], n: [f64; 3], u: [f64; 3]) -> NonrigidPlane1<Hyper> {
-    let [v, n, u] = [v, n, u].map(|vector| vector.map(Hyper::constant));
-    NonrigidPlane1::new(Hyper::constant(turn), v, n, u)
+fn complex_plane1(turn: f64, v: [f64; 3], n: [f64; 3], u: [f64; 3]) -> NonrigidPlane1<Complex> {
+    let [v, n, u] = [v, n, u].map(|vector| vector.map(Complex::real));
+    NonrigidPlane1::new(Complex::real(turn), v, n, u)
 }
 
-fn hyper_plane4(turn: f64, w: [f64; 4], v: [f64; 3], n: [f64; 3], u: [f64; 3]) -> NonrigidPlane4<Hyper> {
-    let [v, n, u] = [v, n, u].map(|vector| vector.map(Hyper::constant));
-    NonrigidPlane4::new(Hyper::constant(turn), w.map(Hyper::constant), v, n, u)
+fn complex_plane4(turn: f64, w: [f64; 4], v: [f64; 3], n: [f64; 3], u: [f64; 3]) -> NonrigidPlane4<Complex> {
+    let [v, n, u] = [v, n, u].map(|vector| vector.map(Complex::real));
+    NonrigidPlane4::new(Complex::real(turn), w.map(Complex::real), v, n, u)
 }
 
-/// Computes the derivatives of a generated Jacobian by dual numbers.
+/// Computes the derivatives of a generated Jacobian by complex steps.
 fn second_derivatives<const U: usize>(
     twists: &[[f64; 6]],
-    jacobian: impl Fn([Hyper; U]) -> Vec<Hyper>,
+    jacobian: impl Fn([Complex; U]) -> Vec<Complex>,
 ) -> Result<Vec<f64>, String> {
     let x = fixed::<U>(twists.as_flattened(), "twists")?;
+    const STEP: f64 = 1e-100;
     let row = |moving: usize| {
-        let at = std::array::from_fn(|i| Hyper::variable(x[i], i == moving, false));
-        jacobian(at).into_iter().map(|entry| entry.0.eps1).collect::<Vec<f64>>()
+        let at = std::array::from_fn(|i| Complex { re: x[i], im: if i == moving { STEP } else { 0.0 } });
+        jacobian(at).into_iter().map(|entry| entry.im / STEP).collect::<Vec<f64>>()
     };
     Ok((0..U).flat_map(row).collect())
 }

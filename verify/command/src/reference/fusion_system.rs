@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use energy_elements::{Binding, GraphEdge, NonrigidPlane4};
-use energy_solve::{Couplings, GaussNewton, GaussNewtonOptions, LeastSquaresTerm, NormalPattern, Placed, ResidualTerm};
+use energy_solve::{Couplings, GaussNewton, GaussNewtonOptions, LeastSquaresTerm, Pattern, Placed, ResidualTerm};
 use serde_json::Value;
 
 use super::fusion::{Case, Lines, bound_place, fixed, numbers, weights};
@@ -13,7 +13,7 @@ struct Terms {
     data: ResidualTerm<NonrigidPlane4, 6>,
     graph: ResidualTerm<GraphEdge, 6>,
     binding: ResidualTerm<Binding, 6>,
-    pattern: Arc<NormalPattern>,
+    pattern: Arc<Pattern>,
 }
 
 /// system: r, JᵀJ, Jᵀr, the pattern of blocks, the step, and the energy after it.
@@ -58,7 +58,7 @@ pub(super) fn system(case: &Case<'_>, lines: &mut Lines) -> Result<(), String> {
     let truth = case.out("E_after_full_step")?;
     lines.compare(case, ("E_after_full_step", 0.0, 10.0 * BOUND), &[energy_after], truth)?;
 
-    let coupled = |row: usize, column: usize| terms.pattern.slot(row.min(column), row.max(column)).is_some();
+    let coupled = |row: usize, column: usize| terms.pattern.place(row, column).is_some();
     let pattern: Vec<f64> = (0..size * size).map(|at| f64::from(u8::from(coupled(at / size, at % size)))).collect();
     lines.exact(case, "block_pattern", numbers(case.out("block_pattern")?)? == pattern);
     lines.exact(case, "rows", numbers(case.out("rows")?)? == [residuals.len() as f64]);
@@ -87,7 +87,7 @@ impl Terms {
         }
         let own: Vec<[u32; 1]> = (0..nodes as u32).map(|node| [node]).collect();
         let stencils = ids.iter().map(<[u32; 4]>::as_slice).chain(edges.iter().map(<[u32; 2]>::as_slice));
-        let pattern = Arc::new(NormalPattern::new(nodes, stencils).map_err(|error| error.to_string())?);
+        let pattern = Arc::new(Couplings::pattern(nodes, stencils).map_err(|error| error.to_string())?);
         let lambda = |name: &str| -> Result<f64, String> {
             numbers(&case.field("lambda")?[name])?.first().copied().ok_or_else(|| format!("`lambda.{name}` is empty"))
         };
@@ -131,7 +131,7 @@ impl Terms {
     }
 }
 
-fn coupled<const K: usize>(pattern: &NormalPattern, stencils: &[[u32; K]]) -> Result<Arc<Couplings>, String> {
+fn coupled<const K: usize>(pattern: &Pattern, stencils: &[[u32; K]]) -> Result<Arc<Couplings>, String> {
     Couplings::new(pattern, stencils).map(Arc::new).map_err(|error| error.to_string())
 }
 

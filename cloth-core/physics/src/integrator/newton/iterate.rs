@@ -213,7 +213,7 @@ impl<'a> Iterate<'a> {
         let mut direction = vec![[0.0; 3]; downhill.len()];
         let mut solved = SolveReport::indefinite();
         if prepared.is_ok() {
-            let (report, solved_by) = solver.solve(matrix, downhill, &mut direction, &options, self.trial);
+            let (report, solved_by) = solver.solve(downhill, &mut direction, &options, self.trial);
             solved = report;
             self.potential.report.solved_by += solved_by;
         }

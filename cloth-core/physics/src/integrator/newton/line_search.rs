@@ -101,3 +101,37 @@ impl IncrementalPotential<'_> {
         Ok(accepted)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use energy_solve::{SolveReport, System};
+
+    use super::super::forcing::Forcing;
+    use super::*;
+    use crate::body::Body;
+
+    /// Searches along a step to 2 − `shortfall` times the distance of the minimum of E = ½ m ‖x − x̂‖², on which E
+    /// falls by about half the shortfall times what the slope promises. Returns the accepted scale.
+    fn accepted(shortfall: f64) -> f64 {
+        let system = System::new(Vec::new(), &[false]).unwrap();
+        let mut body = Body { x: vec![[0.0; 3]], v: vec![[2.0, -1.0, 0.5]], masses: vec![3.0], system };
+        let mut potential = IncrementalPotential::new(&mut body, 0.1);
+        let x = vec![[0.0; 3]];
+        let away = potential.inertial(0);
+        let energy = potential.energy(&x).unwrap();
+        let vectors = vec![away.map(|component| (2.0 - shortfall) * component)];
+        let downhill = [away.map(|component| 3.0 * component)];
+        let forcing = Forcing { gradient: 1.0, tolerance: 0.1, is_first: true };
+        let direction = Direction::new(&downhill, vectors, Curvature::Exact, forcing, SolveReport::indefinite());
+        let step = potential.line_search(&x, energy, &direction, Prefetch::Nothing).unwrap().unwrap();
+        assert!(step.energy.value < energy.value);
+        step.scale
+    }
+
+    #[test]
+    fn a_step_must_lower_the_energy_by_a_part_of_what_the_slope_promises() {
+        assert_eq!(accepted(2.2 * DECREASE), 1.0);
+        assert_eq!(accepted(1.8 * DECREASE), 0.5);
+        assert_eq!(accepted(1.0), 1.0);
+    }
+}

@@ -1,9 +1,9 @@
-//! [`Number`] for num-dual's hyper-dual numbers. They let the interpreter differentiate a formula independently of the
-//! compiler.
+//! [`Number`] for num-dual's hyper-dual numbers, which differentiate a formula independently of the compiler and of the
+//! audit's jets.
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
-use energy_dsl::{Level, Number};
+use energy_dsl::{Baseline, Level, Number};
 use num_dual::{DualNum, HyperDual64};
 
 /// A hyper-dual number a + b ε₁ + c ε₂ + d ε₁ε₂ with ε₁² = ε₂² = 0: a value, two first derivatives and their mixed
@@ -129,45 +129,38 @@ impl Number for Hyper {
     }
 }
 
-#[cfg(test)]
-mod tests {
-    use energy_dsl::Baseline;
+/// At (3, 4), f = atan2(y, x) has f_x = −y/r², f_xy = (y² − x²)/r⁴.
+#[test]
+fn second_derivatives_of_the_angle_of_a_point() {
+    let x = Hyper::variable(3.0, true, false);
+    let y = Hyper::variable(4.0, false, true);
+    let angle = y.atan2::<Baseline>(x).0;
+    assert!((angle.re - 4.0_f64.atan2(3.0)).abs() < 1e-15);
+    assert!((angle.eps1 + 4.0 / 25.0).abs() < 1e-15, "{angle:?}");
+    assert!((angle.eps2 - 3.0 / 25.0).abs() < 1e-15, "{angle:?}");
+    assert!((angle.eps1eps2 - 7.0 / 625.0).abs() < 1e-15, "{angle:?}");
+}
 
-    use super::*;
-
-    /// At (3, 4), f = atan2(y, x) has f_x = −y/r², f_xy = (y² − x²)/r⁴.
-    #[test]
-    fn second_derivatives_of_the_angle_of_a_point() {
-        let x = Hyper::variable(3.0, true, false);
-        let y = Hyper::variable(4.0, false, true);
-        let angle = y.atan2::<Baseline>(x).0;
-        assert!((angle.re - 4.0_f64.atan2(3.0)).abs() < 1e-15);
-        assert!((angle.eps1 + 4.0 / 25.0).abs() < 1e-15, "{angle:?}");
-        assert!((angle.eps2 - 3.0 / 25.0).abs() < 1e-15, "{angle:?}");
-        assert!((angle.eps1eps2 - 7.0 / 625.0).abs() < 1e-15, "{angle:?}");
+/// On the y axis, where y/x is infinite: φ_x = −1/y, φ_xy = 1/y².
+#[test]
+fn the_angle_of_a_point_on_the_axis() {
+    for y in [2.0, -2.0] {
+        let angle = Hyper::variable(y, false, true).atan2::<Baseline>(Hyper::variable(0.0, true, false)).0;
+        assert_eq!(angle.re, std::f64::consts::FRAC_PI_2.copysign(y));
+        assert_eq!((angle.eps1, angle.eps2, angle.eps1eps2), (-1.0 / y, 0.0, 0.25));
     }
+}
 
-    /// On the y axis, where y/x is infinite: φ_x = −1/y, φ_xy = 1/y².
-    #[test]
-    fn the_angle_of_a_point_on_the_axis() {
-        for y in [2.0, -2.0] {
-            let angle = Hyper::variable(y, false, true).atan2::<Baseline>(Hyper::variable(0.0, true, false)).0;
-            assert_eq!(angle.re, std::f64::consts::FRAC_PI_2.copysign(y));
-            assert_eq!((angle.eps1, angle.eps2, angle.eps1eps2), (-1.0 / y, 0.0, 0.25));
-        }
-    }
-
-    #[test]
-    fn powers_and_selections() {
-        let x = Hyper::variable(-2.0, true, true);
-        let cube = x.powf::<Baseline>(Hyper::constant(3.0)).0;
-        assert_eq!((cube.re, cube.eps1, cube.eps1eps2), (-8.0, 12.0, -12.0));
-        let magnitude = x.abs().0;
-        assert_eq!((magnitude.re, magnitude.eps1), (2.0, -1.0));
-        let chosen = Hyper::select(x.less(Hyper::constant(0.0)), x * x, Hyper::constant(f64::NAN)).0;
-        assert_eq!((chosen.re, chosen.eps1, chosen.eps1eps2), (4.0, -4.0, 2.0));
-        // The scale counts as a constant in the derivative.
-        let scaled = (x * x.power_of_two_scale()).0;
-        assert_eq!((scaled.re, scaled.eps1), (-1.0, 0.5));
-    }
+#[test]
+fn powers_and_selections() {
+    let x = Hyper::variable(-2.0, true, true);
+    let cube = x.powf::<Baseline>(Hyper::constant(3.0)).0;
+    assert_eq!((cube.re, cube.eps1, cube.eps1eps2), (-8.0, 12.0, -12.0));
+    let magnitude = x.abs().0;
+    assert_eq!((magnitude.re, magnitude.eps1), (2.0, -1.0));
+    let chosen = Hyper::select(x.less(Hyper::constant(0.0)), x * x, Hyper::constant(f64::NAN)).0;
+    assert_eq!((chosen.re, chosen.eps1, chosen.eps1eps2), (4.0, -4.0, 2.0));
+    // The scale counts as a constant in the derivative.
+    let scaled = (x * x.power_of_two_scale()).0;
+    assert_eq!((scaled.re, scaled.eps1), (-1.0, 0.5));
 }

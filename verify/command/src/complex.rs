@@ -7,13 +7,13 @@ use energy_dsl::{Level, Number};
 /// A number with an imaginary step. Comparisons and absolute values use the real part, so that derivatives are right
 /// between kinks.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Complex {
-    pub(super) re: f64,
-    pub(super) im: f64,
+pub(crate) struct Complex {
+    pub(crate) re: f64,
+    pub(crate) im: f64,
 }
 
 impl Complex {
-    fn real(re: f64) -> Self {
+    pub(crate) fn real(re: f64) -> Self {
         Self { re, im: 0.0 }
     }
 

@@ -5,6 +5,8 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+use cloth_core::output::{SolidMesh, vertex_normals};
+use cloth_core::view::{Button, Colouring, Command, Input, Orbit, Stage, ViewError, Viewer, colour};
 use energy_dsl::Vector3;
 use kiss3d::glamx::glam::camera::rh::proj::opengl;
 use kiss3d::glamx::{Mat4, Pose3, Vec2, Vec3};
@@ -13,11 +15,25 @@ use kiss3d::prelude::{
     Texture, TextureManager, Window, WindowEvent,
 };
 
-use super::colouring::{Colouring, colour};
-use super::orbit::Orbit;
-use super::stage::{Stage, ViewError};
-use super::viewer::{Button, Command, Input, Viewer};
-use crate::output::{SolidMesh, vertex_normals};
+/// A window that cannot be opened.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum WindowError {
+    /// The scene or run cannot be opened.
+    #[error(transparent)]
+    View(#[from] ViewError),
+    /// No display is available.
+    #[error(
+        "there is no display to open a window on: set DISPLAY or WAYLAND_DISPLAY, \
+         or write a picture with `cloth view … --screenshot FILE.png`"
+    )]
+    NoDisplay,
+    /// The rendering engine cannot open a window.
+    #[error("cannot open a window: {reason}; write a picture with `cloth view … --screenshot FILE.png`")]
+    NoWindow {
+        /// Message of the engine.
+        reason: String,
+    },
+}
 
 /// Time for steps between two pictures.
 const PATIENCE: Duration = Duration::from_millis(25);
@@ -32,11 +48,11 @@ const HAIR: Color = Color::new(0.45, 0.26, 0.13, 1.0);
 ///
 /// # Errors
 /// Returns an error if the scene or run cannot be opened, or no display is available.
-pub fn open_window(path: &Path, colouring: Colouring, wireframe: bool) -> Result<(), ViewError> {
+pub(crate) fn open_window(path: &Path, colouring: Colouring, wireframe: bool) -> Result<(), WindowError> {
     let viewer = Viewer::new(Stage::open(path)?, colouring, wireframe);
     let is_there = |name: &str| std::env::var_os(name).is_some_and(|value| !value.is_empty());
     if cfg!(target_os = "linux") && !is_there("DISPLAY") && !is_there("WAYLAND_DISPLAY") {
-        return Err(ViewError::NoDisplay);
+        return Err(WindowError::NoDisplay);
     }
     let window = window(&format!("cloth: {}", path.display()))?;
     kiss3d::pollster::block_on(show(viewer, window));
@@ -45,14 +61,14 @@ pub fn open_window(path: &Path, colouring: Colouring, wireframe: bool) -> Result
 
 /// Opens a window. The engine panics if it cannot reach a display or has no graphics device; this is turned into an
 /// error.
-fn window(title: &str) -> Result<Window, ViewError> {
+fn window(title: &str) -> Result<Window, WindowError> {
     let hook = std::panic::take_hook();
     std::panic::set_hook(Box::new(|_| ()));
     let opened = std::panic::catch_unwind(|| kiss3d::pollster::block_on(Window::new_with_size(title, 1200, 900)));
     std::panic::set_hook(hook);
     opened.map_err(|panic| {
         let text = panic.downcast_ref::<String>().map(String::as_str).or_else(|| panic.downcast_ref::<&str>().copied());
-        ViewError::NoWindow { reason: text.unwrap_or("the engine gives no reason").to_owned() }
+        WindowError::NoWindow { reason: text.unwrap_or("the engine gives no reason").to_owned() }
     })
 }
 
