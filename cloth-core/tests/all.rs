@@ -11,6 +11,7 @@ mod exported_garment;
 mod folders;
 mod frame_rates;
 mod hostile_folders;
+mod hostile_scenes;
 mod known_answers;
 mod limits;
 mod linear_solvers;

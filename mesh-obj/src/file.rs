@@ -13,6 +13,8 @@ pub const LARGEST_FILE: u64 = 256 << 20;
 pub const MOST_CORNERS: usize = 1 << 16;
 /// The largest number of groups of a face.
 pub const MOST_NAMES: usize = 16;
+/// The largest texture coordinate. Files of results hold them in single precision.
+pub const LARGEST_UV: f64 = 1e9;
 
 /// An OBJ file that cannot be read.
 #[derive(Debug, thiserror::Error)]
@@ -197,6 +199,9 @@ impl ObjFile {
             Some("vt") => {
                 // A missing second coordinate is 0.
                 let [u, v] = numbers(words.chain(["0"]).take(2))?;
+                if let Some(other) = [u, v].into_iter().find(|x| x.is_nan() || x.abs() > LARGEST_UV) {
+                    return Err(format!("expected a texture coordinate of at most {LARGEST_UV:e}, got {other:e}"));
+                }
                 self.uvs.push([u, v]);
             }
             Some("vn") => self.normal_count += 1,
@@ -327,6 +332,17 @@ mod tests {
         assert!(error.contains("at most 16 groups"), "{error}");
         assert!(message(&format!("{triangle}f 1 2 {}\n", i64::MIN)).contains("not among the 3"));
         assert!(message(&format!("{triangle}f 1 2 4294967296\n")).contains("not among the 3"));
+    }
+
+    #[test]
+    fn texture_coordinates_are_finite_in_single_precision() {
+        for (uv, shown) in [("nan 0", "NaN"), ("0 inf", "inf"), ("-1e300 0", "-1e300"), ("0 1.1e9", "1.1e9")] {
+            let error = message(&format!("v 0 0 0\nvt {uv}\n"));
+            let expected = format!("a.obj:2: expected a texture coordinate of at most 1e9, got {shown}: `vt {uv}`");
+            assert_eq!(error, expected);
+        }
+        let file = ObjFile::parse("vt -1e9 0.5\nvt 3\n", Path::new("a.obj")).unwrap();
+        assert_eq!(file.uvs, [[-1e9, 0.5], [3.0, 0.0]]);
     }
 
     #[test]

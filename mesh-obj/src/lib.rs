@@ -10,4 +10,4 @@
 mod file;
 mod lines;
 
-pub use file::{Corner, Face, LARGEST_FILE, MOST_CORNERS, MOST_NAMES, ObjFile, ObjFileError};
+pub use file::{Corner, Face, LARGEST_FILE, LARGEST_UV, MOST_CORNERS, MOST_NAMES, ObjFile, ObjFileError};

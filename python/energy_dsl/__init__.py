@@ -31,6 +31,8 @@ if TYPE_CHECKING:
     _Scene = str | _os.PathLike[str] | _Mapping[str, _Any]
     #: Called with the number of steps done and of all steps.
     _Progress = _Callable[[int, int], object]
+    #: The most `steps` and `bytes` of the compiler. One that is not named is 1e7 or 4e8.
+    _Limits = _Mapping[str, float]
 
 __all__ = [
     "AuditReport", "Contacts", "Element", "Elements", "EnergyError", "FolderInUseError", "Input", "Minimum",
@@ -53,21 +55,24 @@ def __dir__() -> list[str]:
     return sorted({*globals(), *__all__})
 
 
-def energy(text: str, file: str = "<text>") -> Element:
+def energy(text: str, file: str = "<text>", *, limits: _Limits | None = None) -> Element:
     """Compiles the one declaration of a text: an energy, a force, a constraint or a residual.
 
-    Raises EnergyError, which names line and column, if the text is wrong or declares several.
+    `limits={"steps": 1e9, "bytes": 4e9}` lets the compiler take more than its ten million steps, some seconds, and 400
+    MB. Ctrl-C ends a compilation.
+
+    Raises EnergyError, which names line and column, if the text is wrong, declares several or exceeds a limit.
     """
-    found = energies(text, file)
+    found = energies(text, file, limits=limits)
     if len(found) != 1:
         raise EnergyError(f"{file}: expected one declaration, got {len(found)}; use energies()")
     return found[0]
 
 
-def load(path: str | _os.PathLike[str]) -> list[Element]:
-    """Compiles all declarations of a file (`.energy`)."""
+def load(path: str | _os.PathLike[str], *, limits: _Limits | None = None) -> list[Element]:
+    """Compiles all declarations of a file (`.energy`), within `limits` as in `energy`."""
     with open(path, encoding="utf-8") as file:
-        return energies(file.read(), _os.fspath(path))
+        return energies(file.read(), _os.fspath(path), limits=limits)
 
 
 @_functools.cache
@@ -102,11 +107,16 @@ class AuditReport:
         return f"<AuditReport: {verdict}>"
 
 
-def audit(text: str, *, quick: bool = False, seed: int = 1, file: str = "<text>") -> AuditReport:
-    """Compares all derivatives of a text with independent methods, and checks its claims, as `verify audit` does."""
+def audit(
+    text: str, *, quick: bool = False, seed: int = 1, file: str = "<text>", limits: _Limits | None = None
+) -> AuditReport:
+    """Compares all derivatives of a text with independent methods, and checks its claims, as `verify audit` does.
+
+    The text is compiled within `limits` as in `energy`.
+    """
     import json
 
-    passed, report, failures = _audit(text, quick=quick, seed=seed, file=file)
+    passed, report, failures = _audit(text, quick=quick, seed=seed, file=file, limits=limits)
     return AuditReport(passed, json.loads(report), failures)
 
 
@@ -221,9 +231,9 @@ def _system(cls: type[System], arguments: tuple[_Any, ...], threads: int, terms:
 
 
 @_functools.lru_cache(maxsize=1024)
-def _declared(text: str, file: str, number: int) -> Element:
+def _declared(text: str, file: str, number: int, steps: int, size: int) -> Element:
     """Makes an element from a pickle. Workers that get one element many times compile it once."""
-    return energies(text, file)[number]
+    return energies(text, file, limits={"steps": steps, "bytes": size})[number]
 
 
 def _bound(element: Element, count: int, dtype: str, threads: int, inputs: dict[str, _Any]) -> Elements:

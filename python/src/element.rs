@@ -3,7 +3,7 @@
 use std::sync::{Arc, Mutex, PoisonError};
 
 use energy_catalogue::BatchRoutine;
-use energy_compiler::{Elements as Tapes, InputKind, InputNumbers, Interpreted};
+use energy_compiler::{Elements as Tapes, InputKind, InputNumbers, Interpreted, Limits};
 use energy_dsl::tape::Column;
 use numpy::{PyArrayDescr, PyArrayDescrMethods, PyArrayDyn, PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::exceptions::{PyTypeError, PyValueError};
@@ -14,6 +14,7 @@ use crate::arrays::{Given, Precision, tuple, wrong_shape};
 use crate::errors::wrong;
 use crate::evaluation::{Batch, Elements, Request};
 use crate::interrupt::compiled;
+use crate::limits::limits_of;
 
 /// An input of an element.
 #[pyclass(frozen, get_all, module = "energy_dsl")]
@@ -67,8 +68,15 @@ pub struct Element {
 pub enum Origin {
     /// The library, which has compiled code for it.
     Library,
-    /// A declaration of a text: the text, the file for messages, and the number of the declaration.
-    Text(Arc<[String; 2]>, usize),
+    /// A text, and the number of the declaration.
+    Text(Arc<Text>, usize),
+}
+
+/// A text, the file for messages, and the limits within which it was compiled.
+pub struct Text {
+    text: String,
+    file: String,
+    limits: Limits,
 }
 
 impl Origin {
@@ -94,10 +102,11 @@ impl BoundCall {
 
 /// Compiles all declarations of a text.
 #[pyfunction]
-#[pyo3(signature = (text, file = "<text>"))]
-pub fn energies(py: Python<'_>, text: &str, file: &str) -> PyResult<Vec<Element>> {
-    let elements = compiled(py, |budget| Interpreted::from_file_within(text, file, budget))?;
-    let text = Arc::new([text.to_owned(), file.to_owned()]);
+#[pyo3(signature = (text, file = "<text>", *, limits = None))]
+pub fn energies(py: Python<'_>, text: &str, file: &str, limits: Option<&Bound<'_, PyAny>>) -> PyResult<Vec<Element>> {
+    let limits = limits_of(limits)?;
+    let elements = compiled(py, limits, |budget| Interpreted::from_file_within(text, file, budget))?;
+    let text = Arc::new(Text { text: text.to_owned(), file: file.to_owned(), limits });
     let element = |(number, inner)| Element::new(inner, Origin::Text(Arc::clone(&text), number));
     Ok(elements.into_iter().enumerate().map(element).collect())
 }
@@ -224,8 +233,9 @@ impl Element {
         Ok(match &self.origin {
             Origin::Library => (package.getattr("element")?, (self.name(),).into_pyobject(py)?),
             Origin::Text(text, number) => {
-                let [text, file] = &**text;
-                (package.getattr("_declared")?, (text, file, *number).into_pyobject(py)?)
+                let Text { text, file, limits } = &**text;
+                let arguments = (text, file, *number, limits.steps, limits.bytes);
+                (package.getattr("_declared")?, arguments.into_pyobject(py)?)
             }
         })
     }

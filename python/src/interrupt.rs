@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-use energy_compiler::{Budget, Diagnostics};
+use energy_compiler::{Budget, Diagnostics, Limits};
 use pyo3::prelude::*;
 
 use crate::errors::wrong;
@@ -12,14 +12,15 @@ use crate::errors::wrong;
 /// The time between two looks at signals.
 const LOOK: Duration = Duration::from_millis(50);
 
-/// Compiles a text without holding the interpreter, and asks Python for signals meanwhile.
+/// Compiles a text within limits and without holding the interpreter, and asks Python for signals meanwhile.
 pub fn compiled<T: Send>(
     py: Python<'_>,
+    limits: Limits,
     compile: impl FnOnce(&Budget) -> Result<T, Diagnostics> + Send,
 ) -> PyResult<T> {
     let raised: Arc<Mutex<Option<PyErr>>> = Arc::default();
     let (seen, last) = (Arc::clone(&raised), Mutex::new(Instant::now()));
-    let budget = Budget::default().watched_by(move |_| {
+    let budget = Budget::new(limits).watched_by(move |_| {
         let mut last = last.lock().unwrap_or_else(PoisonError::into_inner);
         if last.elapsed() < LOOK {
             return ControlFlow::Continue(());

@@ -6,6 +6,7 @@ mod errors;
 mod evaluation;
 mod exclusive;
 mod interrupt;
+mod limits;
 mod simulation;
 mod stencils;
 mod system;

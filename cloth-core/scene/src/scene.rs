@@ -10,8 +10,8 @@ use super::{
     ContactChoice, Exclusion, Garment, Hair, ObstacleDescription, OutputChoice, Pin, SceneError, Seam, Sleep, TimeGrid,
 };
 
-/// The largest size of a scene file, in bytes.
-const LARGEST_FILE: u64 = 16 << 20;
+/// The largest size of a scene file, in bytes. Parsing takes up to 80 times as much memory.
+const LARGEST_FILE: u64 = 4 << 20;
 
 /// A scene: what to simulate, and which files to write.
 #[derive(Clone, Debug, PartialEq, Deserialize)]

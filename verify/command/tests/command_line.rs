@@ -318,6 +318,9 @@ fn plans_name_each_route_and_the_one_taken() {
     }
     let first = printed.lines().nth(1).unwrap();
     assert!(first.contains("gathered at primitives") && first.contains("taken"), "{first}");
+    let last = printed.lines().last().unwrap();
+    assert!(last.starts_with("StVK took ") && last.ends_with(" of 400 MB"), "{last}");
+    assert!(last.contains(" of 10,000,000 steps to compile, and "), "{last}");
 }
 
 #[test]

@@ -2,7 +2,7 @@ use std::borrow::Cow;
 use std::path::Path;
 
 use anyhow::Context;
-use energy_compiler::{Budget, Interpreted, Textbook};
+use energy_compiler::{Budget, Interpreted, Limits, Textbook};
 use energy_dsl::{AnyElement, Declaration, Inputs, Kind, Outputs, RestError};
 use fastrand::Rng;
 
@@ -144,7 +144,9 @@ impl Subject {
         evaluate: EvaluateAny,
         interpreted: Option<Interpreted>,
     ) -> Result<Self, String> {
-        let formula = Textbook::from_source(&declaration.source).map_err(|errors| errors.to_string())?;
+        // The text was compiled within its budget, and the textbook form takes less.
+        let formula = Textbook::from_source_within(&declaration.source, &Budget::new(Limits::NONE))
+            .map_err(|errors| errors.to_string())?;
         let meter = Meter::new(&declaration);
         Ok(Self { declaration, evaluate, formula, interpreted, routines: None, meter })
     }

@@ -29,7 +29,12 @@ pub trait Range {
         if is_above && is_below {
             return Ok(());
         }
-        let got = if all.is_empty() { format!("{number}") } else { format!("{all:?}") };
+        let got = match all {
+            // `{}` writes 309 digits for 1e308.
+            [] if number.abs() > LARGEST => format!("{number:e}"),
+            [] => format!("{number}"),
+            _ => format!("{all:?}"),
+        };
         let [one, several] = Self::NAMES;
         let wanted = if all.is_empty() { one.to_owned() } else { format!("{several} only") };
         Err(E::custom(if number.is_finite() && number.abs() > most && has_most {

@@ -2,7 +2,7 @@ use std::fmt::Write as _;
 
 use proc_macro2::TokenStream;
 
-use crate::budget::{Budget, Limits};
+use crate::budget::{Budget, Limits, Progress, grouped};
 use crate::check::Program;
 use crate::diagnostic::Diagnostics;
 use crate::emit::emit;
@@ -30,12 +30,15 @@ pub enum Path {
 /// let listing = energy_compiler::Listing::from_source(source).unwrap().remove(0);
 /// assert!(listing.routine("hessian").unwrap().contains("fn hessian_at<L: ::energy_dsl::Level>"));
 /// assert!(listing.plans().contains("adjoint-weighted"));
+/// assert!(listing.plans().contains("of 10,000,000 steps to compile"));
 /// ```
 #[derive(Clone, Debug)]
 pub struct Listing {
     name: String,
     code: TokenStream,
     routines: Routines,
+    /// The budget before the declaration was lowered, and after its code was written.
+    spent: [Progress; 2],
 }
 
 impl Listing {
@@ -65,11 +68,13 @@ impl Listing {
 
     fn of(programs: &[Program]) -> Result<Vec<Self>, Diagnostics> {
         let listing = |program: &Program| {
+            let before = program.budget.progress();
             let mut routines = differentiate(program, lower(program));
             let code = emit(program, &Plan::new(program, &routines));
+            let spent = [before, program.budget.progress()];
             // What is counted later is not part of the compilation.
             routines.graph = routines.graph.paid_by(&Budget::new(Limits::NONE));
-            Self { name: program.name.clone(), code, routines }
+            Self { name: program.name.clone(), code, routines, spent }
         };
         let within = |program: &Program| program.budget.within(|| listing(program));
         programs.iter().map(|program| within(program).map_err(|stop| program.stopped(stop).into())).collect()
@@ -159,7 +164,7 @@ impl Listing {
     }
 
     /// Lists the routes to the derivatives of each routine, with their operations on the ordinary path in reduced
-    /// coordinates. The first one was taken.
+    /// coordinates. The first one was taken. The last line has the steps and the memory of the compiler.
     #[must_use]
     pub fn plans(&self) -> String {
         let mut text = String::new();
@@ -187,6 +192,19 @@ impl Listing {
                 .expect("writing to a string succeeds");
             }
         }
+        let [before, after] = self.spent;
+        let (steps, bytes) = (after.steps - before.steps, after.bytes - before.bytes);
+        let megabytes = |bytes: u64| bytes as f64 / 1e6;
+        writeln!(
+            text,
+            "{} took {} of {} steps to compile, and {:.1} of {:.0} MB",
+            self.name,
+            grouped(steps),
+            grouped(after.limits.steps),
+            megabytes(bytes),
+            megabytes(after.limits.bytes)
+        )
+        .expect("writing to a string succeeds");
         text
     }
 }

@@ -46,7 +46,15 @@ impl Textbook {
     /// # Errors
     /// Whatever is wrong with the text.
     pub fn from_source(source: &str) -> Result<Self, Diagnostics> {
-        let program = programs(source, &Budget::default())?.into_iter().next().ok_or_else(|| {
+        Self::from_source_within(source, &Budget::default())
+    }
+
+    /// Parses the first declaration of a text within a budget.
+    ///
+    /// # Errors
+    /// Whatever is wrong with the text, and a budget that is spent.
+    pub fn from_source_within(source: &str, budget: &Budget) -> Result<Self, Diagnostics> {
+        let program = programs(source, budget)?.into_iter().next().ok_or_else(|| {
             let here = Span::of(proc_macro2::Span::call_site());
             Diagnostics::from(Diagnostic::new(&here, "expected a declaration, found none"))
         })?;

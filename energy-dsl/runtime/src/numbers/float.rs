@@ -3,7 +3,7 @@ use super::level::Level;
 use super::real::Real;
 
 /// `f32` or `f64`: a number that fills the registers of every SIMD level.
-pub trait Float: Real + Lane<Self> {
+pub trait Float: Real + Lane<Self> + 'static {
     /// The widest register of a level.
     type Lanes<L: Level>: Lane<Self>;
 }

@@ -4,8 +4,7 @@ use std::ops::{Add, BitAnd, BitOr, Div, Mul, Neg, Not, Sub};
 use super::cpu::{Scalar, dispatch_scalar};
 use super::elementary::{Atan2, Binary, Cos, Exp, Ln, ModerateAtan2, Pow, Sin, Unary, sin_cos};
 use super::level::{Baseline, Kernel, Level};
-use super::limits::Care;
-use super::unbounded::{Unbounded, WithCare};
+use super::unbounded::{OnSlices, Unbounded, WithCare, on_slices};
 
 /// The outcome of a comparison: a `bool`, or one per lane.
 pub trait Mask: Copy + Debug + BitAnd<Output = Self> + BitOr<Output = Self> + Not<Output = Self> {
@@ -187,15 +186,13 @@ pub trait Number:
     fn is_representable(&self) -> bool {
         (self.clone() - self.clone()).equal(Self::from_f64(0.0)).all()
     }
-    /// Runs the general path of a routine over this type.
+    /// Returns the general path of a routine over this type.
     #[doc(hidden)]
-    fn run_with_care<W: WithCare<INPUTS, OUTPUTS>, const INPUTS: usize, const OUTPUTS: usize>(
-        inputs: &[Self; INPUTS],
-    ) -> ([Self; OUTPUTS], Care<Self>)
+    fn general_path<W: WithCare<INPUTS, OUTPUTS>, const INPUTS: usize, const OUTPUTS: usize>() -> OnSlices<Self>
     where
         Self: Real,
     {
-        W::run(inputs)
+        on_slices::<W, Self, INPUTS, OUTPUTS>
     }
     /// Runs a kernel over this type at the level that suits it: the best level of the machine for `f64` and `f32`.
     fn dispatch<K: Kernel>(kernel: K) -> K::Output {

@@ -334,10 +334,8 @@ impl<S: Scalar> Number for Unbounded<S> {
         let large = S::power_of_two(S::LAST - 8);
         Self::of(if S::default() < self.significand { large } else { -large })
     }
-    fn run_with_care<W: WithCare<INPUTS, OUTPUTS>, const INPUTS: usize, const OUTPUTS: usize>(
-        inputs: &[Self; INPUTS],
-    ) -> ([Self; OUTPUTS], Care<Self>) {
-        S::run_unbounded::<W, INPUTS, OUTPUTS>(inputs)
+    fn general_path<W: WithCare<INPUTS, OUTPUTS>, const INPUTS: usize, const OUTPUTS: usize>() -> OnSlices<Self> {
+        S::unbounded_path::<W, INPUTS, OUTPUTS>()
     }
 }
 
@@ -369,19 +367,39 @@ pub trait WithCare<const INPUTS: usize, const OUTPUTS: usize> {
 #[doc(hidden)]
 #[derive(Debug)]
 pub struct Precautions<const INPUTS: usize, const OUTPUTS: usize> {
-    pub(crate) double: Routine<Unbounded<f64>, INPUTS, OUTPUTS>,
-    ray: Routine<Ray, INPUTS, OUTPUTS>,
-    is_outside: fn(&[f64; INPUTS]) -> bool,
+    pub(crate) double: OnSlices<Unbounded<f64>>,
+    ray: OnSlices<Ray>,
+    is_outside: fn(&[f64]) -> bool,
 }
-
-type Routine<T, const INPUTS: usize, const OUTPUTS: usize> = fn(&[T; INPUTS]) -> ([T; OUTPUTS], Care<T>);
 
 impl<const INPUTS: usize, const OUTPUTS: usize> Precautions<INPUTS, OUTPUTS> {
     /// Creates the table of a routine.
     #[must_use]
     pub const fn of<W: WithCare<INPUTS, OUTPUTS>>() -> Self {
-        Self { double: W::run::<Unbounded<f64>>, ray: W::run::<Ray>, is_outside: W::is_outside_at::<f64, Baseline> }
+        Self {
+            double: on_slices::<W, Unbounded<f64>, INPUTS, OUTPUTS>,
+            ray: on_slices::<W, Ray, INPUTS, OUTPUTS>,
+            is_outside: |inputs| W::is_outside_at::<f64, Baseline>(array(inputs)),
+        }
     }
+}
+
+/// The general path of a routine: writes the results at some inputs. With slices, the code that calls it is the same
+/// for all routines.
+pub type OnSlices<T> = fn(&[T], &mut [T]) -> Care<T>;
+
+/// Runs the general path of a routine.
+pub(crate) fn on_slices<W: WithCare<INPUTS, OUTPUTS>, T: Real, const INPUTS: usize, const OUTPUTS: usize>(
+    inputs: &[T],
+    results: &mut [T],
+) -> Care<T> {
+    let (found, care) = W::run(array(inputs));
+    results.copy_from_slice(&found);
+    care
+}
+
+fn array<T, const INPUTS: usize>(inputs: &[T]) -> &[T; INPUTS] {
+    inputs.try_into().expect("as many numbers as inputs")
 }
 
 /// Runs the general path in the lanes where `extraordinary` holds; the other lanes are 0. Scalars and lanes run the
@@ -397,16 +415,19 @@ pub fn with_care<W: WithCare<INPUTS, OUTPUTS>, T: Real, const INPUTS: usize, con
     summed: usize,
 ) -> ([T; OUTPUTS], Flags<T>) {
     let mut outputs = [T::from_f64(0.0); OUTPUTS];
-    let flags = in_lanes(inputs, extraordinary, summed, &mut outputs, &|own: &[T::Unbounded]| {
-        let own = own.try_into().expect("as many numbers as inputs");
-        let (results, flags) = of_one::<W, T::Unbounded, INPUTS, OUTPUTS>(own);
-        (results.to_vec(), flags)
-    });
+    let &Precautions { ray, is_outside, .. } = W::compiled();
+    let path = Path { roles: W::ROLES, run: T::Unbounded::general_path::<W, INPUTS, OUTPUTS>(), ray, is_outside };
+    let flags = in_lanes(inputs, extraordinary, summed, &mut outputs, &path);
     (outputs, flags)
 }
 
-/// Results at the inputs of one lane.
-type OfOne<'a, T> = &'a dyn Fn(&[T]) -> (Vec<T>, Flags<T>);
+/// The general path of a routine.
+struct Path<T: Number> {
+    roles: Roles<'static>,
+    run: OnSlices<T>,
+    ray: OnSlices<Ray>,
+    is_outside: fn(&[f64]) -> bool,
+}
 
 /// Runs a path in some lanes. It is compiled once for a type of lanes, not once for a routine: it is more code than the
 /// paths themselves.
@@ -416,16 +437,17 @@ fn in_lanes<T: Real>(
     lanes: T::Mask,
     summed: usize,
     outputs: &mut [T],
-    of_one: OfOne<'_, T::Unbounded>,
+    path: &Path<T::Unbounded>,
 ) -> Flags<T> {
     let (mut degenerate, mut kink) = (0, 0);
+    let mut results = vec![T::Unbounded::from_f64(0.0); outputs.len()];
     for lane in 0..u32::BITS as usize {
         if lanes.bits() >> lane & 1 == 0 {
             continue;
         }
         let own: Vec<T::Unbounded> = inputs.iter().map(|input| input.unbounded(lane)).collect();
-        let (results, flags) = of_one(&own);
-        for (number, (output, result)) in outputs.iter_mut().zip(results).enumerate() {
+        let flags = path.of_one(&own, &mut results);
+        for (number, (output, &result)) in outputs.iter_mut().zip(&results).enumerate() {
             output.set_lane(lane, if number < summed { result } else { result.saturated() });
         }
         degenerate |= u32::from(flags.degenerate.any()) << lane;
@@ -435,24 +457,23 @@ fn in_lanes<T: Real>(
     Flags { degenerate: mask(degenerate), kink: mask(kink) }
 }
 
-/// Returns the results at one input.
-#[inline(never)]
-fn of_one<W: WithCare<INPUTS, OUTPUTS>, T: Real<Unbounded = T>, const INPUTS: usize, const OUTPUTS: usize>(
-    inputs: &[T; INPUTS],
-) -> ([T; OUTPUTS], Flags<T>) {
-    let mut plain = [0.0; INPUTS];
-    if doubles(inputs, &mut plain) && (W::compiled().is_outside)(&plain) {
-        let mut results = std::array::from_fn(|_| T::from_f64(0.0));
-        fill_outside(W::ROLES, &mut results);
-        return (results, Flags::degenerate());
+impl<T: Real> Path<T> {
+    /// Writes the results at one input.
+    fn of_one(&self, inputs: &[T], results: &mut [T]) -> Flags<T> {
+        let mut plain = vec![0.0; inputs.len()];
+        if doubles(inputs, &mut plain) && (self.is_outside)(&plain) {
+            fill_outside(self.roles, results);
+            return Flags::degenerate();
+        }
+        let care = (self.run)(inputs, results);
+        let outputs = results.len();
+        let along = |rays: &[Ray]| {
+            let mut results = vec![Ray::from_f64(0.0); outputs];
+            let care = (self.ray)(rays, &mut results);
+            (results, care.flags.degenerate)
+        };
+        settle(inputs, self.roles, results, care, &along)
     }
-    let (mut results, care) = T::run_with_care::<W, INPUTS, OUTPUTS>(inputs);
-    let along = |rays: &[Ray]| {
-        let (results, care) = (W::compiled().ray)(rays.try_into().expect("as many rays as inputs"));
-        (results.to_vec(), care.flags.degenerate)
-    };
-    let flags = settle(inputs, W::ROLES, &mut results, care, &along);
-    (results, flags)
 }
 
 /// Writes the nearest doubles. Returns whether the type has them.

@@ -1,5 +1,7 @@
 //! The slots of a routine for one block of elements, and its results.
 
+use std::any::Any;
+
 use super::TAPE_BLOCK;
 use super::instruction::Tape;
 use super::lanes::{Run, Slot};
@@ -50,6 +52,18 @@ impl<S: Float> Slots<S> {
 
     /// Runs the routine on the first `count` elements.
     pub(super) fn run(&mut self, routine: &Routine, count: usize) {
+        let slots: &mut dyn Any = self;
+        if let Some(slots) = slots.downcast_mut() {
+            run_doubles(slots, routine, count);
+        } else if let Some(slots) = slots.downcast_mut() {
+            run_singles(slots, routine, count);
+        } else {
+            unreachable!("`Float` is f32 or f64");
+        }
+    }
+
+    #[inline(always)]
+    fn run_here(&mut self, routine: &Routine, count: usize) {
         let Self { numbers, masks, .. } = self;
         dispatch(Run { tape: &routine.tape, slots: numbers.as_chunks_mut().0, masks, count });
         let present = u64::MAX >> (64 - count);
@@ -84,6 +98,18 @@ impl<S: Float> Slots<S> {
             Some(replaced) => Results { numbers: replaced, at: &self.identity },
         }
     }
+}
+
+/// Not generic, so that the interpreter is compiled in this crate alone: it is 170 kB of code with all SIMD levels.
+#[inline(never)]
+fn run_doubles(slots: &mut Slots<f64>, routine: &Routine, count: usize) {
+    slots.run_here(routine, count);
+}
+
+/// As [`run_doubles`].
+#[inline(never)]
+fn run_singles(slots: &mut Slots<f32>, routine: &Routine, count: usize) {
+    slots.run_here(routine, count);
 }
 
 /// The results of a block of elements.

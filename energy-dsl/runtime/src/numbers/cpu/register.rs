@@ -4,9 +4,8 @@ use super::lanes::Lanes;
 use crate::numbers::elementary::{Binary, Unary};
 use crate::numbers::lane::{Lane, check_transposed, gather_by_element, transpose_by_element};
 use crate::numbers::level::{Kernel, Level};
-use crate::numbers::limits::Care;
 use crate::numbers::real::{Mask, Number};
-use crate::numbers::unbounded::{Unbounded, WithCare};
+use crate::numbers::unbounded::{OnSlices, Unbounded, WithCare, on_slices};
 
 /// A floating-point number that lanes are made of, with the bit patterns of its format.
 pub trait Scalar: Lane<Self> + Number<Mask = bool> + PartialOrd + Default {
@@ -43,15 +42,14 @@ pub trait Scalar: Lane<Self> + Number<Mask = bool> + PartialOrd + Default {
     fn power_of_two(exponent: i32) -> Self;
     /// Returns the bounds within which [`crate::Number::is_moderate`] holds.
     fn moderate_bounds(degree: u8) -> (Self, Self);
-    /// Runs the general path of a routine in this precision.
-    fn run_unbounded<W: WithCare<INPUTS, OUTPUTS>, const INPUTS: usize, const OUTPUTS: usize>(
-        inputs: &[Unbounded<Self>; INPUTS],
-    ) -> ([Unbounded<Self>; OUTPUTS], Care<Unbounded<Self>>);
+    /// Returns the general path of a routine in this precision.
+    fn unbounded_path<W: WithCare<INPUTS, OUTPUTS>, const INPUTS: usize, const OUTPUTS: usize>()
+    -> OnSlices<Unbounded<Self>>;
 }
 
 macro_rules! scalar {
     (
-        $float:ident, $bits:ident, $run_with_care:expr, $mantissa_bits:literal, $bias:literal, $splitter:literal,
+        $float:ident, $bits:ident, $general_path:expr, $mantissa_bits:literal, $bias:literal, $splitter:literal,
         $moderate:literal, $span:literal, $reach:literal
     ) => {
         impl Scalar for $float {
@@ -89,10 +87,9 @@ macro_rules! scalar {
                 let power = |exponent: $bits| $float::from_bits(exponent << $mantissa_bits);
                 (power($bias - limit), power($bias + limit))
             }
-            fn run_unbounded<W: WithCare<INPUTS, OUTPUTS>, const INPUTS: usize, const OUTPUTS: usize>(
-                inputs: &[Unbounded<Self>; INPUTS],
-            ) -> ([Unbounded<Self>; OUTPUTS], Care<Unbounded<Self>>) {
-                $run_with_care(inputs)
+            fn unbounded_path<W: WithCare<INPUTS, OUTPUTS>, const INPUTS: usize, const OUTPUTS: usize>()
+            -> OnSlices<Unbounded<Self>> {
+                $general_path
             }
         }
     };
@@ -102,7 +99,7 @@ macro_rules! scalar {
 scalar!(
     f64,
     u64,
-    |inputs| (W::compiled().double)(inputs),
+    W::compiled().double,
     52,
     1023,
     134_217_729.0,
@@ -110,7 +107,7 @@ scalar!(
     340_282_366_920_938_463_463_374_607_431_768_211_456.0,
     500
 );
-scalar!(f32, u32, W::run, 23, 127, 4097.0, 12, 16.0, 95);
+scalar!(f32, u32, on_slices::<W, _, INPUTS, OUTPUTS>, 23, 127, 4097.0, 12, 16.0, 95);
 
 /// A register of numbers. If it needs processor features, it is used only in kernels that run at the level of the
 /// register.
