@@ -33,7 +33,8 @@ impl Target {
     /// If the reader refuses the input.
     ///
     /// # Panics
-    /// If the reader panics, runs for more than [`PATIENCE`], or writes a message that is 4000 bytes longer than the input.
+    /// If the reader panics, runs for more than [`PATIENCE`], or writes a message that is 4000 bytes longer than the
+    /// input.
     pub fn run(&self, input: &[u8]) -> Result<(), String> {
         let start = now();
         let outcome = FOLDER.with(|folder| (self.read)(input, folder.path()));
