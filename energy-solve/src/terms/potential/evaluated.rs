@@ -153,13 +153,16 @@ impl<E: PackedPotential<f64>> Kernel for Release<'_, '_, '_, E> {
         let mut waiting = std::mem::take(&mut to.waiting);
         waiting.project::<L>(projection);
         waiting.release::<L::F64>(|held, lanes, numbers| {
-            let mut numbers = numbers.chunks_exact(<L::F64 as Lane<f64>>::LANES).map(L::F64::load);
-            let mut next = |_: usize| numbers.next().expect("all numbers were stored");
+            let zero = L::F64::splat(0.0);
             let mask = |bits: u32| <L::F64 as Number>::Mask::from_bits(bits);
             let flags = Flags { degenerate: mask(held.degenerate), kink: mask(held.kink) };
-            let value = next(0);
-            let (gradient, hessian) = (Array::from_fn(&mut next), Array::from_fn(&mut next));
-            let reduced = ReducedHessian { value, gradient, hessian, flags };
+            let (gradient, hessian) = (Array::repeat(zero), Array::repeat(zero));
+            let mut reduced: Reduced<E, L::F64> = ReducedHessian { value: zero, gradient, hessian, flags };
+            let mut stored = numbers.chunks_exact(<L::F64 as Lane<f64>>::LANES);
+            let parts = [std::slice::from_mut(&mut reduced.value), reduced.gradient.as_mut(), reduced.hessian.as_mut()];
+            for (number, stored) in parts.into_iter().flatten().zip(&mut stored) {
+                *number = L::F64::load(stored);
+            }
             L::F64::dispatch(Addition::<E, _> { to: &mut *to, lanes, reduced: &reduced, changed: held.changed });
         });
         to.waiting = waiting;
