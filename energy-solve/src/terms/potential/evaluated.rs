@@ -5,8 +5,8 @@ use std::marker::PhantomData;
 use std::ops::Range;
 
 use energy_dsl::{
-    Array, BLOCK, Batch, BatchWork, Declaration, Flags, Kernel, Lane, Level, Mask, Number, Packed, PackedPotential,
-    Potential, ReducedHessian, ReducedPotential, Vector3, WidePoints, dispatch, for_each_batch_in,
+    Array, BLOCK, Batch, BatchWork, Block, Declaration, Flags, Kernel, Lane, Level, Mask, Number, Packed,
+    PackedPotential, Potential, ReducedHessian, ReducedPotential, Vector3, WidePoints, dispatch, for_each_batch_in,
 };
 
 use super::waiting::Held;
@@ -117,7 +117,7 @@ impl<E: PackedPotential<f64>> BatchWork<E> for Hessians<'_, '_> {
             open = 0;
         }
         if open == 0 && self.waiting.is_empty() {
-            L::F64::dispatch(Addition::<E, _> { to: self, lanes, reduced: &reduced, changed });
+            L::F64::dispatch(Expansion::<E, _> { to: self, lanes, reduced: &reduced, changed });
             return;
         }
         let Flags { degenerate, kink } = reduced.flags;
@@ -163,7 +163,7 @@ impl<E: PackedPotential<f64>> Kernel for Release<'_, '_, '_, E> {
             for (number, stored) in parts.into_iter().flatten().zip(&mut stored) {
                 *number = L::F64::load(stored);
             }
-            L::F64::dispatch(Addition::<E, _> { to: &mut *to, lanes, reduced: &reduced, changed: held.changed });
+            L::F64::dispatch(Expansion::<E, _> { to: &mut *to, lanes, reduced: &reduced, changed: held.changed });
         });
         to.waiting = waiting;
     }
@@ -178,7 +178,7 @@ type Reduced<E, V> = ReducedHessian<
 
 /// Expands the results of a batch and adds them to a linearisation. A [`Kernel`] of its own is compiled for the SIMD
 /// level without being inlined.
-struct Addition<'k, 'a, 'b, E: PackedPotential<f64>, V: Lane<f64>> {
+struct Expansion<'k, 'a, 'b, E: PackedPotential<f64>, V: Lane<f64>> {
     to: &'k mut Hessians<'a, 'b>,
     lanes: Lanes<'k>,
     reduced: &'k Reduced<E, V>,
@@ -186,7 +186,7 @@ struct Addition<'k, 'a, 'b, E: PackedPotential<f64>, V: Lane<f64>> {
     changed: u32,
 }
 
-impl<E: PackedPotential<f64>, V: Lane<f64>> Kernel for Addition<'_, '_, '_, E, V> {
+impl<E: PackedPotential<f64>, V: Lane<f64>> Kernel for Expansion<'_, '_, '_, E, V> {
     type Output = ();
 
     #[inline(always)]
@@ -194,9 +194,36 @@ impl<E: PackedPotential<f64>, V: Lane<f64>> Kernel for Addition<'_, '_, '_, E, V
         let Self { to, lanes, reduced, changed } = self;
         let mut result = <E::Wide<V> as ReducedPotential<V>>::expand::<{ u32::MAX }>(reduced);
         let flagged = lanes_in(result.flags.degenerate | result.flags.kink, lanes.count);
-        let (mut v, mut sums) = (result.gradient, result.gradient);
-        let numbers =
-            Expanded { value: result.value, gradient: result.gradient.as_ref(), triangle: result.hessian.as_mut() };
-        to.add(&lanes, numbers, (flagged, changed), [v.as_mut(), sums.as_mut()]);
+        V::dispatch(Addition {
+            to,
+            lanes,
+            value: result.value,
+            gradient: &result.gradient,
+            triangle: &mut result.hessian,
+            bits: (flagged, changed),
+        });
+    }
+}
+
+/// Adds the results of a batch to a linearisation. Elements with equally many points share this code.
+struct Addition<'k, 'a, 'b, V, P, T> {
+    to: &'k mut Hessians<'a, 'b>,
+    lanes: Lanes<'k>,
+    value: V,
+    gradient: &'k P,
+    triangle: &'k mut T,
+    /// Flagged and projected lanes.
+    bits: (u32, u32),
+}
+
+impl<V: Lane<f64>, P: Array<Vector3<V>>, T: Array<Block<V>>> Kernel for Addition<'_, '_, '_, V, P, T> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<L: Level>(self) {
+        let Self { to, lanes, value, gradient, triangle, bits } = self;
+        let (mut v, mut sums) = (*gradient, *gradient);
+        let numbers = Expanded { value, gradient: gradient.as_ref(), triangle: triangle.as_mut() };
+        to.add(&lanes, numbers, bits, [v.as_mut(), sums.as_mut()]);
     }
 }
