@@ -12,7 +12,7 @@ use tempfile::TempDir;
 
 use crate::runs::with_scene;
 
-const SCENE: &str = r#"dt = 0.01
+pub(crate) const SCENE: &str = r#"dt = 0.01
 duration = 0.2
 frames_per_second = 50
 integrator = "newton"

@@ -5,27 +5,8 @@ use std::path::Path;
 use std::process::Command;
 use std::time::{Duration, Instant};
 
+use crate::hostile_folders::SCENE;
 use crate::runs::with_scene;
-
-const SCENE: &str = r#"dt = 0.01
-duration = 0.2
-frames_per_second = 50
-integrator = "newton"
-
-[[garment]]
-name = "sheet"
-mesh.sheet = { cells = [3, 3], size = [1.0, 1.0] }
-[garment.fabric]
-density = 0.2
-material.stvk = { stretch_stiffness = 40.0, poisson_ratio = 0.3 }
-
-[[pins]]
-vertex = 0
-
-[output]
-picture = false
-ledger = true
-"#;
 
 /// Runs the program with 300 MB of address space; returns its exit status and its messages.
 fn cloth(folder: &Path, limit: &str, arguments: &[&str]) -> (Option<i32>, String) {

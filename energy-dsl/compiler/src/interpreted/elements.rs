@@ -227,7 +227,7 @@ impl<S: Float> Elements<S> {
     ) -> Result<Flagged, EvaluateError> {
         let routines = self.tape.routines();
         if !routines.has(routine) {
-            let declaration = Arc::clone(&self.element.declaration);
+            let declaration = Arc::clone(&self.element.plan.declaration);
             return Err(EvaluateError::Routine { declaration, routine: routine.name() });
         }
         Ok(self.tape.evaluate(routine, range, Places::Rows(x), v.map(Places::Rows), outputs)?)

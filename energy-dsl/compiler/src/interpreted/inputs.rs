@@ -138,7 +138,7 @@ impl Interpreted {
         count: usize,
         given: &[Column<'a, S>],
     ) -> Result<Vec<(Column<'a, S>, usize)>, BindError> {
-        let element = || self.declaration.name.to_string();
+        let element = || self.plan.declaration.name.to_string();
         let inputs: Vec<&InputNumbers> = self.inputs.iter().filter(|input| input.kind == kind).collect();
         if inputs.len() != given.len() {
             let needed = inputs.iter().map(|input| input.name.clone()).collect();

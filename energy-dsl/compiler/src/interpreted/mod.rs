@@ -53,7 +53,6 @@ pub use layouts::Layouts;
 /// ```
 #[derive(Clone, Debug)]
 pub struct Interpreted {
-    declaration: Arc<Declaration>,
     inputs: Arc<Vec<InputNumbers>>,
     plan: Arc<Plan>,
     routines: Arc<tape::Routines>,
@@ -129,7 +128,6 @@ impl Interpreted {
             inputs: Arc::new(InputNumbers::of(program)),
             routines: Arc::new(tapes(&plan)?),
             layouts: Arc::new(Layouts::of(&plan.declaration)),
-            declaration: Arc::new(plan.declaration.clone()),
             plan: Arc::new(plan),
             audit_samples: program.audit_samples,
         })
@@ -145,7 +143,7 @@ impl Interpreted {
     /// outlives the element shares it.
     #[must_use]
     pub fn declaration(&self) -> &Arc<Declaration> {
-        &self.declaration
+        &self.plan.declaration
     }
 
     /// Returns all inputs in declared order: points or unknowns, rest shape, parameters. Stiffness `ks` and damping
@@ -165,7 +163,7 @@ impl Interpreted {
     /// points.
     #[must_use]
     pub fn reduced_coordinates(&self) -> usize {
-        self.declaration.reduced_coordinates
+        self.plan.declaration.reduced_coordinates
     }
 
     /// Returns the routines as tapes.

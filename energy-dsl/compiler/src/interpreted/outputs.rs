@@ -99,17 +99,17 @@ impl Interpreted {
         // False for infinite numbers and NaN.
         let sound = |x: &T| (x.clone() - x.clone()).equal(T::from_f64(0.0)).all();
         if flags.degenerate.any() || !numbers.iter().all(sound) {
-            return Err(RestError { element: self.declaration.name.clone() });
+            return Err(RestError { element: self.plan.declaration.name.clone() });
         }
         Ok(numbers)
     }
 
     /// Collects the blocks of a kind from its routines.
     fn outputs<T: Number>(&self, run: &dyn Fn(RoutineKind) -> Results<T>) -> Outputs<T> {
-        let points = self.declaration.points.len();
+        let points = self.plan.declaration.points.len();
         let (mut blocks, mut repeats) = (Vec::new(), Vec::new());
         let mut flags = [Flags::clear(), Flags::clear(), Flags::clear()];
-        if matches!(self.declaration.kind, Kind::Energy | Kind::Constraint) {
+        if matches!(self.plan.declaration.kind, Kind::Energy | Kind::Constraint) {
             let ((value, of_value), (gradient, of_gradient)) = (run(RoutineKind::Value), run(RoutineKind::Gradient));
             let (hessian, of_hessian) = run(RoutineKind::Hessian);
             blocks.push(("energy", value[0].clone()));
@@ -120,17 +120,17 @@ impl Interpreted {
             repeats.push(("hessian", "grad", hessian[1].clone()));
             flags = [of_value, of_gradient, of_hessian];
         }
-        if matches!(self.declaration.kind, Kind::Force | Kind::Constraint) {
+        if matches!(self.plan.declaration.kind, Kind::Force | Kind::Constraint) {
             let ((force, of_force), (jacobians, of_jacobians)) = (run(RoutineKind::Force), run(RoutineKind::Jacobians));
             blocks.push(("force", force[0].clone()));
             blocks.push(("dfdx", full_square(points, &jacobians[1])));
             blocks.push(("dfdv", full_square(points, &jacobians[2])));
             repeats.push(("jacobians", "force", jacobians[0].clone()));
-            if self.declaration.kind == Kind::Force {
+            if self.plan.declaration.kind == Kind::Force {
                 flags = [of_force, of_jacobians.clone(), of_jacobians];
             }
         }
-        match self.declaration.kind {
+        match self.plan.declaration.kind {
             Kind::Constraint => {
                 let (jacobian, _) = run(RoutineKind::ConstraintJacobian);
                 blocks.extend([("constraint", jacobian[0].clone()), ("jacobian", jacobian[1].clone())]);

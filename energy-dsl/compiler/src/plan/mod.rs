@@ -10,6 +10,8 @@ pub(crate) use groups::{Shape, groups};
 pub(crate) use routine::{GeneralPlan, RoutinePlan};
 pub(crate) use statements::{Code, RETURNED};
 
+use std::sync::Arc;
+
 use crate::check::Program;
 use crate::lower::Repetition;
 use crate::routines::Routines;
@@ -19,7 +21,7 @@ use energy_runtime::{Declaration, RoutineKind};
 #[derive(Clone, Debug)]
 pub(crate) struct Plan {
     /// The self-description that all renderings have.
-    pub(crate) declaration: Declaration,
+    pub(crate) declaration: Arc<Declaration>,
     /// Coordinates of the points, or unknowns of a residual.
     pub(crate) coordinates: usize,
     /// Number of parameter numbers.
@@ -46,7 +48,7 @@ impl Plan {
         let is_expanded = |kind: RoutineKind| kind == RoutineKind::Hessian && expansion.is_some();
         let list = routines.list.iter().filter(|routine| !is_expanded(routine.kind));
         Self {
-            declaration: description::description(program, routines),
+            declaration: Arc::new(description::description(program, routines)),
             coordinates: program.moving_size(),
             parameters: program.parameters_size(),
             shape: program.rest.iter().map(|input| input.input_type.size()).sum(),

@@ -106,17 +106,18 @@ impl<E: PackedPotential<f64>> BatchWork<E> for Hessians<'_, '_> {
         let mut reduced = batch.element.reduced_hessian_at::<L>(batch.points);
         let n = <<E::Wide<L::F64> as ReducedPotential<L::F64>>::Coordinates as Array<L::F64>>::LEN;
         let (derivatives, points) = ((reduced.gradient.as_ref(), reduced.hessian.as_mut()), batch.points.as_ref());
-        let Examined { mut open, mut changed } = self.examine::<L>(E::DECLARATION, &lanes, derivatives, n, points);
-        let vectors = difference_vectors::<L>(E::DECLARATION, points);
-        if open.count_ones() as usize == <L::F64 as Lane<f64>>::LANES
-            && self.waiting.is_empty()
-            && let Some(projection) = self.projection(E::DECLARATION)
-        {
-            let hessian = reduced.hessian.as_mut();
-            changed |= self.waiting.project_now::<L>(projection, hessian, vectors.as_flattened());
-            open = 0;
+        let Examined { open, mut changed } = self.examine::<L>(E::DECLARATION, &lanes, derivatives, n, points);
+        let is_next = self.waiting.is_empty();
+        if open == 0 && is_next {
+            L::F64::dispatch(Expansion::<E, _> { to: self, lanes, reduced: &reduced, changed });
+            return;
         }
-        if open == 0 && self.waiting.is_empty() {
+        let vectors = difference_vectors::<L>(E::DECLARATION, points);
+        if let Some(projection) = self.projection(E::DECLARATION)
+            && open.count_ones() as usize == <L::F64 as Lane<f64>>::LANES
+            && is_next
+        {
+            changed |= self.waiting.project_now::<L>(projection, reduced.hessian.as_mut(), vectors.as_flattened());
             L::F64::dispatch(Expansion::<E, _> { to: self, lanes, reduced: &reduced, changed });
             return;
         }
