@@ -224,3 +224,22 @@ fn lanes_do_not_affect_each_other() {
     assert_eq!(alone[0], beside[0]);
     assert_eq!(counts.hessian.projected, 1);
 }
+
+/// More coordinates than arrays hold: chains of springs and angles through 5 to 8 points, drawn from a seed.
+#[test]
+fn elements_of_many_points() {
+    fn check_chain<const N: usize>(seed: u64) {
+        let weight = |i: usize| 1.0 + f64::from((seed.wrapping_mul(2_654_435_761) >> (3 * i % 24)) as u32 % 7) / 4.0;
+        let names: Vec<String> = (0..N).map(|i| format!("p{i}")).collect();
+        let terms: Vec<String> = (1..N)
+            .map(|i| format!("{} * (norm_squared(p{i} - p{}) - 1)^2", weight(i), i - 1))
+            .chain((2..N).map(|i| format!("{} * dot(p{i} - p{}, p{} - p{})^3", weight(2 * i), i - 1, i - 1, i - 2)))
+            .collect();
+        let source = format!("energy Chain({}: Point; k: Scalar) {{ k * ({}) }}", names.join(", "), terms.join(" + "));
+        let read = Read::of_text(&source);
+        on_random(&points::<N>(), |x| check(|| read.term(COUNT, &[], &[2.0]), &x));
+    }
+    check_chain::<5>(20_261_128);
+    check_chain::<6>(31_415);
+    check_chain::<8>(27_182);
+}

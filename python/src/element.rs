@@ -2,8 +2,8 @@
 
 use std::sync::{Arc, Mutex, PoisonError};
 
-use energy_catalogue::BatchRoutine;
 use energy_compiler::{Elements as Tapes, InputKind, InputNumbers, Interpreted, Limits};
+use energy_dsl::RoutineKind;
 use energy_dsl::tape::Column;
 use numpy::{PyArrayDescr, PyArrayDescrMethods, PyArrayDyn, PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::exceptions::{PyTypeError, PyValueError};
@@ -355,7 +355,7 @@ macro_rules! evaluations {
                 flags: bool,
                 inputs: Option<&Bound<'py, PyDict>>,
             ) -> PyResult<Bound<'py, PyAny>> {
-                let (routine, v) = (BatchRoutine::$routine, evaluations!(@v $($v)?));
+                let (routine, v) = (RoutineKind::$routine, evaluations!(@v $($v)?));
                 self.bound_for($x, inputs)?.evaluate(&Request { routine, x: $x, v, out, flags })
             })*
         }
@@ -371,7 +371,7 @@ macro_rules! evaluations {
                 out: Option<&Bound<'py, PyAny>>,
                 flags: bool,
             ) -> PyResult<Bound<'py, PyAny>> {
-                let (routine, v) = (BatchRoutine::$routine, evaluations!(@v $($v)?));
+                let (routine, v) = (RoutineKind::$routine, evaluations!(@v $($v)?));
                 self.evaluate(&Request { routine, x: $x, v, out, flags })
             })*
         }
@@ -392,9 +392,9 @@ evaluations! {
     /// Returns f(x, v), of shape (n, points, 3).
     force(x, v) => Force;
     /// Returns f, ∂f/∂x and ∂f/∂v; the last two of shape (n, 3 points, 3 points).
-    force_jacobians(x, v) => ForceJacobians;
+    force_jacobians(x, v) => Jacobians;
     /// Returns C, of shape (n, rows), and ∂C/∂x, of shape (n, rows, 3 points).
-    constraint(x) => Constraint;
+    constraint(x) => ConstraintJacobian;
     /// Returns r(u), of shape (n, rows), for unknowns of shape (n, unknowns).
     residual(u) => Residual;
     /// Returns r and ∂r/∂u, of shape (n, rows, unknowns).

@@ -2,10 +2,10 @@
 
 use std::ops::Range;
 
-use energy_catalogue::{BatchRoutine, CompiledBatch};
+use energy_catalogue::CompiledBatch;
 use energy_compiler::{Elements as Tapes, EvaluateError, InputKind, Interpreted};
-use energy_dsl::Flagged;
 use energy_dsl::tape::TAPE_BLOCK;
+use energy_dsl::{Flagged, RoutineKind};
 use numpy::{PyArray1, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
@@ -115,7 +115,7 @@ impl Elements {
 
 /// A call of a routine from Python.
 pub struct Request<'a, 'py> {
-    pub routine: BatchRoutine,
+    pub routine: RoutineKind,
     /// Positions or unknowns.
     pub x: &'a Bound<'py, PyAny>,
     /// Velocities or vectors, if the routine takes any.
@@ -164,7 +164,7 @@ impl<S: Precision> Batch<S> {
     fn evaluate<'py>(&self, request: &Request<'_, 'py>) -> PyResult<Bound<'py, PyAny>> {
         let &Request { routine, x, v, out, flags } = request;
         let (py, expected) = (x.py(), self.sizes.input(routine));
-        let name = if matches!(routine, BatchRoutine::Residual | BatchRoutine::Jacobian) { "u" } else { "x" };
+        let name = if matches!(routine, RoutineKind::Residual | RoutineKind::Jacobian) { "u" } else { "x" };
         let input = |name, value| {
             let array = array::<S>(name, value)?;
             if array.shape() == &expected[..] {
@@ -201,7 +201,7 @@ impl<S: Precision> Batch<S> {
 
     fn write(
         &self,
-        routine: BatchRoutine,
+        routine: RoutineKind,
         x: &[S],
         v: &[S],
         results: &mut [&mut [S]],
@@ -239,7 +239,7 @@ impl<S: Precision> Batch<S> {
     fn write_part(
         &self,
         part: &Part<S>,
-        routine: BatchRoutine,
+        routine: RoutineKind,
         x: &[S],
         v: &[S],
         results: &mut [&mut [S]],
@@ -251,15 +251,15 @@ impl<S: Precision> Batch<S> {
         }
         let (all, tapes) = (part.range.clone(), &self.tapes);
         match (routine, results) {
-            (BatchRoutine::Value, [u]) => tapes.values(all, x, u),
-            (BatchRoutine::Gradient, [u, g]) => tapes.gradients(all, x, u, g),
-            (BatchRoutine::Hessian, [u, g, h]) => tapes.hessians(all, x, u, g, h),
-            (BatchRoutine::HessianVector, [product]) => tapes.hessian_vectors(all, x, v, product),
-            (BatchRoutine::Force, [f]) => tapes.forces(all, x, v, f),
-            (BatchRoutine::ForceJacobians, [f, by_x, by_v]) => tapes.force_jacobians(all, x, v, f, by_x, by_v),
-            (BatchRoutine::Constraint, [c, j]) => tapes.constraints(all, x, c, j),
-            (BatchRoutine::Residual, [r]) => tapes.residuals(all, x, r),
-            (BatchRoutine::Jacobian, [r, j]) => tapes.jacobians(all, x, r, j),
+            (RoutineKind::Value, [u]) => tapes.values(all, x, u),
+            (RoutineKind::Gradient, [u, g]) => tapes.gradients(all, x, u, g),
+            (RoutineKind::Hessian, [u, g, h]) => tapes.hessians(all, x, u, g, h),
+            (RoutineKind::HessianVector, [product]) => tapes.hessian_vectors(all, x, v, product),
+            (RoutineKind::Force, [f]) => tapes.forces(all, x, v, f),
+            (RoutineKind::Jacobians, [f, by_x, by_v]) => tapes.force_jacobians(all, x, v, f, by_x, by_v),
+            (RoutineKind::ConstraintJacobian, [c, j]) => tapes.constraints(all, x, c, j),
+            (RoutineKind::Residual, [r]) => tapes.residuals(all, x, r),
+            (RoutineKind::Jacobian, [r, j]) => tapes.jacobians(all, x, r, j),
             _ => unreachable!("as many slots as results"),
         }
     }
@@ -279,15 +279,15 @@ impl Sizes {
         Self { count: elements, points, rows: element.declaration().rows, unknowns }
     }
 
-    fn input(&self, routine: BatchRoutine) -> Shape {
+    fn input(&self, routine: RoutineKind) -> Shape {
         match routine {
-            BatchRoutine::Residual | BatchRoutine::Jacobian => [self.count, self.unknowns].into(),
+            RoutineKind::Residual | RoutineKind::Jacobian => [self.count, self.unknowns].into(),
             _ => [self.count, self.points, 3].into(),
         }
     }
 
     /// Returns the results of a routine; only the given number of them counts.
-    fn slots(&self, routine: BatchRoutine) -> ([Slot; 3], usize) {
+    fn slots(&self, routine: RoutineKind) -> ([Slot; 3], usize) {
         let (n, p, rows) = (self.count, self.points, self.rows);
         let slot = |name, shape: Shape| Slot { name, shape };
         let (vectors, matrix) = (Shape::from([n, p, 3]), Shape::from([n, 3 * p, 3 * p]));
@@ -295,17 +295,21 @@ impl Sizes {
         let (energy, gradient) = (slot("U", [n].into()), slot("gradient", vectors));
         let residual = slot("residual", [n, rows].into());
         match routine {
-            BatchRoutine::Value => ([energy, unused, unused], 1),
-            BatchRoutine::Gradient => ([energy, gradient, unused], 2),
-            BatchRoutine::Hessian => ([energy, gradient, slot("Hessian", matrix)], 3),
-            BatchRoutine::HessianVector => ([slot("product", vectors), unused, unused], 1),
-            BatchRoutine::Force => ([slot("force", vectors), unused, unused], 1),
-            BatchRoutine::ForceJacobians => ([slot("force", vectors), slot("∂f/∂x", matrix), slot("∂f/∂v", matrix)], 3),
-            BatchRoutine::Constraint => {
+            RoutineKind::Value => ([energy, unused, unused], 1),
+            RoutineKind::Gradient => ([energy, gradient, unused], 2),
+            RoutineKind::Hessian => ([energy, gradient, slot("Hessian", matrix)], 3),
+            RoutineKind::HessianVector => ([slot("product", vectors), unused, unused], 1),
+            RoutineKind::Force => ([slot("force", vectors), unused, unused], 1),
+            RoutineKind::Jacobians => ([slot("force", vectors), slot("∂f/∂x", matrix), slot("∂f/∂v", matrix)], 3),
+            RoutineKind::ConstraintJacobian => {
                 ([slot("C", [n, rows].into()), slot("Jacobian", [n, rows, 3 * p].into()), unused], 2)
             }
-            BatchRoutine::Residual => ([residual, unused, unused], 1),
-            BatchRoutine::Jacobian => ([residual, slot("Jacobian", [n, rows, self.unknowns].into()), unused], 2),
+            RoutineKind::Residual => ([residual, unused, unused], 1),
+            RoutineKind::Rest
+            | RoutineKind::ReducedHessian
+            | RoutineKind::ConstraintHessian
+            | RoutineKind::GaussNewton => ([unused; 3], 0),
+            RoutineKind::Jacobian => ([residual, slot("Jacobian", [n, rows, self.unknowns].into()), unused], 2),
         }
     }
 }

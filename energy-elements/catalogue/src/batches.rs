@@ -1,39 +1,17 @@
 //! Compiled elements with bound parameters, behind one interface for all types.
 
-use energy_dsl::{BatchError, Flagged, Float};
-
-/// A routine of many elements: what is written for each.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum BatchRoutine {
-    /// Energies U.
-    Value,
-    /// U and ∂U/∂x.
-    Gradient,
-    /// U, ∂U/∂x and ∂²U/∂x², row by row.
-    Hessian,
-    /// (∂²U/∂x²) v.
-    HessianVector,
-    /// f(x, v).
-    Force,
-    /// f, ∂f/∂x and ∂f/∂v, row by row.
-    ForceJacobians,
-    /// C and ∂C/∂x.
-    Constraint,
-    /// r(u).
-    Residual,
-    /// r and ∂r/∂u, row by row.
-    Jacobian,
-}
+use energy_dsl::{BatchError, Flagged, Float, RoutineKind};
 
 /// Elements of one type with bound parameters. Element i reads the i-th numbers of `x` and `v`: three coordinates for
 /// each point, or its unknowns.
 pub trait CompiledBatch<S>: Send + Sync {
-    /// Writes the results of a routine for all elements. `v` may be empty if the routine does not read it.
+    /// Writes the results of a routine for all elements, matrices row by row. `v` may be empty if the routine does not
+    /// read it.
     /// `None` if the routine is not compiled: products of Hessians and
     /// vectors, and constraints as such with their forces.
     fn evaluate(
         &self,
-        routine: BatchRoutine,
+        routine: RoutineKind,
         x: &[S],
         v: &[S],
         results: &mut [&mut [S]],
@@ -49,13 +27,14 @@ pub trait CompiledBatch<S>: Send + Sync {
 ///
 /// ```
 /// # #[cfg(feature = "batches")] {
-/// use energy_catalogue::{BatchRoutine, bind};
+/// use energy_catalogue::bind;
+/// use energy_dsl::RoutineKind;
 ///
 /// // HookeSpring(p, q; k, L): U = k/2 (‖p − q‖ − L)².
 /// let springs = bind::<f64>("HookeSpring", 2, |_| vec![100.0, 1.0]).unwrap();
 /// let x = [0.0, 0.0, 0.0, 2.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0];
 /// let mut energies = [0.0; 2];
-/// springs.evaluate(BatchRoutine::Value, &x, &[], &mut [&mut energies]).unwrap().unwrap();
+/// springs.evaluate(RoutineKind::Value, &x, &[], &mut [&mut energies]).unwrap().unwrap();
 /// assert_eq!(energies, [50.0, 0.0]);
 /// # }
 /// ```

@@ -5,11 +5,11 @@ use std::ops::Range;
 
 use energy_dsl::{
     BatchError, Declaration, Element, Flagged, Float, Packed, PackedForce, PackedPotential, PackedResidual, Routine,
-    Stored,
+    RoutineKind, Stored,
 };
 use energy_elements::for_each_element;
 
-use crate::batches::{BatchRoutine, Bind, CompiledBatch, Scalar};
+use crate::batches::{Bind, CompiledBatch, Scalar};
 use crate::matrices::{hessian_matrices, jacobian_matrices};
 
 /// Whether no routine of an element has more operations than the largest that is compiled.
@@ -109,16 +109,16 @@ struct Potentials<E, S>(Packed<E, S>);
 impl<E: PackedPotential<S> + Send + Sync, S: Float + Send + Sync> CompiledBatch<S> for Potentials<E, S> {
     fn evaluate(
         &self,
-        routine: BatchRoutine,
+        routine: RoutineKind,
         x: &[S],
         _: &[S],
         results: &mut [&mut [S]],
     ) -> Option<Result<Flagged, BatchError>> {
         let (all, x) = (all(&self.0), x.as_chunks().0);
         match (routine, results) {
-            (BatchRoutine::Value, [u]) => Some(self.0.values(all, x, u)),
-            (BatchRoutine::Gradient, [u, g]) => Some(self.0.gradients(all, x, u, g)),
-            (BatchRoutine::Hessian, [u, g, h]) => Some(hessian_matrices(&self.0, x, u, g, h)),
+            (RoutineKind::Value, [u]) => Some(self.0.values(all, x, u)),
+            (RoutineKind::Gradient, [u, g]) => Some(self.0.gradients(all, x, u, g)),
+            (RoutineKind::Hessian, [u, g, h]) => Some(hessian_matrices(&self.0, x, u, g, h)),
             _ => None,
         }
     }
@@ -129,15 +129,15 @@ struct Forces<E, S>(Packed<E, S>);
 impl<E: PackedForce<S> + Send + Sync, S: Float + Send + Sync> CompiledBatch<S> for Forces<E, S> {
     fn evaluate(
         &self,
-        routine: BatchRoutine,
+        routine: RoutineKind,
         x: &[S],
         v: &[S],
         results: &mut [&mut [S]],
     ) -> Option<Result<Flagged, BatchError>> {
         let (all, x, v) = (all(&self.0), x.as_chunks().0, v.as_chunks().0);
         match (routine, results) {
-            (BatchRoutine::Force, [f]) => Some(self.0.forces(all, x, v, f)),
-            (BatchRoutine::ForceJacobians, [f, by_x, by_v]) => Some(jacobian_matrices(&self.0, x, v, f, [by_x, by_v])),
+            (RoutineKind::Force, [f]) => Some(self.0.forces(all, x, v, f)),
+            (RoutineKind::Jacobians, [f, by_x, by_v]) => Some(jacobian_matrices(&self.0, x, v, f, [by_x, by_v])),
             _ => None,
         }
     }
@@ -148,14 +148,14 @@ struct Residuals<E, S>(Packed<E, S>);
 impl<E: PackedResidual<S> + Send + Sync, S: Float + Send + Sync> CompiledBatch<S> for Residuals<E, S> {
     fn evaluate(
         &self,
-        routine: BatchRoutine,
+        routine: RoutineKind,
         x: &[S],
         _: &[S],
         results: &mut [&mut [S]],
     ) -> Option<Result<Flagged, BatchError>> {
         match (routine, results) {
-            (BatchRoutine::Residual, [r]) => Some(self.0.residuals(all(&self.0), x, r)),
-            (BatchRoutine::Jacobian, [r, j]) => Some(self.0.jacobians(all(&self.0), x, r, j)),
+            (RoutineKind::Residual, [r]) => Some(self.0.residuals(all(&self.0), x, r)),
+            (RoutineKind::Jacobian, [r, j]) => Some(self.0.jacobians(all(&self.0), x, r, j)),
             _ => None,
         }
     }

@@ -12,7 +12,7 @@ mod matrices;
 
 use energy_dsl::AnyElement;
 
-pub use batches::{BatchRoutine, CompiledBatch, Scalar, bind};
+pub use batches::{CompiledBatch, Scalar, bind};
 
 macro_rules! entries {
     ($($name:ident),* $(,)?) => { &[$(AnyElement::of::<energy_elements::$name<f64>>()),*] };
