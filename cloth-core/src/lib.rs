@@ -4,16 +4,10 @@
 //!
 //! Modules, from the bottom up; each uses only those above it:
 //!
-//! - of the crate [`cloth_physics`]:
-//!   - [`geometry`], [`mesh`], [`motion`]: vectors, rigid motions, triangle meshes, keyframes
-//!   - [`collision`]: pairs of features, certificates of moves, the exact test for crossings
-//!   - [`barrier`]: contact of cloth with itself
-//!   - [`fabric`], [`contact`], [`wind`]: the other forces, as terms of declared elements
-//!   - [`integrator`]: time integration of a [`Body`]
-//! - [`scene`], the crate [`cloth_scene`]: the file format
-//! - of the crate [`cloth_simulation`]:
-//!   - [`ledger`], [`model`]: the energy balance, and the assembly of a scene into islands
-//!   - [`simulation`], [`output`]: stepping, and output files
+//! - [`physics`], a crate of its own: meshes, fabrics, contact, integrators
+//! - [`scene`], a crate of its own: the file format
+//! - [`ledger`], [`model`]: the energy balance, and the assembly of a scene into islands
+//! - [`simulation`], [`output`]: stepping, sleep, saved states; frames, animations and pictures
 //! - [`run`]: runs with checkpoints and reports
 //! - [`sweep`]: the scenes of a sweep
 //! - [`view`], [`demo`], [`materials`], [`mod@bench`], [`validate`]: what the binary offers on top
@@ -54,12 +48,19 @@ mod book;
 
 pub mod bench;
 pub mod demo;
+pub mod ledger;
+pub mod materials;
+pub mod model;
+pub mod output;
 pub mod run;
+pub mod simulation;
 pub mod sweep;
 pub mod validate;
 pub mod view;
 
-pub use cloth_materials as materials;
-pub use cloth_physics::{Body, barrier, collision, contact, fabric, geometry, integrator, mesh, motion, wind};
+pub use cloth_physics as physics;
 pub use cloth_scene as scene;
-pub use cloth_simulation::{Island, Simulation, SimulationError, Summary, ledger, model, output, simulation};
+pub use simulation::{Island, Simulation, SimulationError, Summary};
+
+// Modules of this crate name those of `physics` as their own.
+use cloth_physics::{Body, barrier, collision, contact, fabric, geometry, integrator, mesh, motion, wind};

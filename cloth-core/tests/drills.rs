@@ -4,7 +4,7 @@
 
 use std::path::Path;
 
-use energy_drill::Drill;
+use energy_files::drill::Drill;
 use tempfile::TempDir;
 
 use crate::runs::with_scene;

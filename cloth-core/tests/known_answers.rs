@@ -1,9 +1,9 @@
 //! The faster validation questions, and the adaptive step.
 
-use cloth_core::integrator::{Adaptive, Integrator, Newton, NewtonOptions, StepError};
+use cloth_core::physics::integrator::{Adaptive, Integrator, Newton, NewtonOptions, StepError};
 use cloth_core::scene::Scene;
 use cloth_core::validate::{self, Cantilever, MeshKind};
-use cloth_core::{Body, Simulation};
+use cloth_core::{Simulation, physics::Body};
 
 fn all_pass(questions: &[&str]) {
     let names: Vec<String> = questions.iter().map(|name| (*name).to_owned()).collect();
@@ -45,8 +45,8 @@ fn squeezed() -> Body {
                  [[pins]]\nnearest = [-0.2, 0.2, 0.0]\n";
     let scene = Scene::parse(scene, "scene.toml".as_ref()).unwrap();
     let shape = scene.garments[0].shape(&scene.folder).unwrap();
-    let nothing = cloth_core::fabric::Surroundings { gravity: [0.0, 0.0, -9.81], drag: 0.0 };
-    let garment = cloth_core::fabric::terms(&scene.garments[0].fabric, &shape.mesh, &shape.springs, &nothing).unwrap();
+    let nothing = cloth_core::physics::fabric::Surroundings { gravity: [0.0, 0.0, -9.81], drag: 0.0 };
+    let garment = cloth_core::physics::fabric::terms(&scene.garments[0].fabric, &shape.mesh, &shape.springs, &nothing).unwrap();
     let x: Vec<[f64; 3]> = shape.start.iter().map(|p| [0.7 * p[0], 0.8 * p[1], 0.01 * (30.0 * p[0]).sin()]).collect();
     let system = energy_solve::System::new(garment.terms, &vec![false; x.len()]).unwrap();
     assert!(Simulation::new(&scene).unwrap().step().is_ok());

@@ -1,11 +1,11 @@
 //! Local elimination of Newton's method: restricted systems, and steps with and without it.
 
-use cloth_core::fabric::{Bending, Fabric, Material, Membrane, Rayleigh, Rigidity, Surroundings, terms};
-use cloth_core::integrator::{Integrator, Newton, NewtonOptions, StepReport};
-use cloth_core::mesh::{Diagonals, Plane, Sheet, SpringNetwork, TriangleMesh};
+use cloth_core::physics::fabric::{Bending, Fabric, Material, Membrane, Rayleigh, Rigidity, Surroundings, terms};
+use cloth_core::physics::integrator::{Integrator, Newton, NewtonOptions, StepReport};
+use cloth_core::physics::mesh::{Diagonals, Plane, Sheet, SpringNetwork, TriangleMesh};
 use cloth_core::scene::Scene;
-use cloth_core::wind::Wind;
-use cloth_core::{Body, Simulation};
+use cloth_core::physics::wind::Wind;
+use cloth_core::{Simulation, physics::Body};
 use energy_dsl::{Declaration, Element, Vector3};
 use energy_elements::Gravity;
 use energy_solve::{
@@ -31,7 +31,7 @@ fn body(
     let membrane = Membrane { stretch_stiffness: 261.0, poisson_ratio: 0.3, bending };
     let fabric = Fabric { rayleigh: Some(rayleigh), ..Fabric::new(0.2, Material::Stvk(membrane)) };
     let surroundings = Surroundings { gravity: [0.0, 0.0, -9.81], drag: 0.5 };
-    let springs = SpringNetwork::of_mesh(&cloth_core::mesh::Topology::of(mesh));
+    let springs = SpringNetwork::of_mesh(&cloth_core::physics::mesh::Topology::of(mesh));
     let mut garment = terms(&fabric, mesh, &springs, &surroundings).unwrap();
     let (velocity, gusts) = ([8.0, 0.5, 2.0], Vec::new());
     let wind = Wind { velocity, gusts, density: 1.2, across: 1.2, along: 0.02, steering: None };

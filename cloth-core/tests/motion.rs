@@ -1,10 +1,10 @@
 //! Conservation laws and the orders of the integrators.
 
-use cloth_core::fabric::{Surroundings, terms};
-use cloth_core::integrator::{ImplicitEuler, Integrator, Newton, NewtonOptions, StepReport, SymplecticEuler};
-use cloth_core::mesh::{SpringNetwork, Topology, TriangleMesh};
+use cloth_core::physics::fabric::{Surroundings, terms};
+use cloth_core::physics::integrator::{ImplicitEuler, Integrator, Newton, NewtonOptions, StepReport, SymplecticEuler};
+use cloth_core::physics::mesh::{SpringNetwork, Topology, TriangleMesh};
 use cloth_core::scene::Scene;
-use cloth_core::{Body, Simulation};
+use cloth_core::{Simulation, physics::Body};
 use energy_solve::{Curvature, LinearisationOptions, SolveOptions, State, System, Weights};
 
 fn scene(head: &str, fabric: &str) -> Scene {

@@ -1,8 +1,8 @@
 //! Plate bending: exact for quadratic height fields on every mesh, with correct derivatives.
 
-use cloth_core::fabric::plate::curvatures;
-use cloth_core::fabric::{PlateTerm, Rigidity};
-use cloth_core::mesh::{Topology, TriangleMesh};
+use cloth_core::physics::fabric::plate::curvatures;
+use cloth_core::physics::fabric::{PlateTerm, Rigidity};
+use cloth_core::physics::mesh::{Topology, TriangleMesh};
 use cloth_core::validate::{MeshKind, Strip};
 use energy_dsl::{Potential, Vector3};
 use energy_elements::{ArcAngle, PlateBending};

@@ -1,7 +1,7 @@
 //! Scenes with several parts: contact, friction, wind, moving pins, seams, hair, and the energy ledger.
 
 use cloth_core::Simulation;
-use cloth_core::fabric::MEASURED;
+use cloth_core::physics::fabric::MEASURED;
 use cloth_core::materials::element;
 use cloth_core::scene::Scene;
 

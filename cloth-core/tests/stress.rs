@@ -1,10 +1,10 @@
 //! Extreme cloths and steps: a step either completes with finite numbers, or returns an error and leaves the cloth
 //! unchanged. A table pins the outcome of each combination.
 
-use cloth_core::Body;
-use cloth_core::fabric::{self, Bending, Fabric, Material, Membrane, Rigidity, Surroundings};
-use cloth_core::integrator::{Adaptive, Integrator, Scheme, StepError};
-use cloth_core::mesh::{Diagonals, Plane, Sheet, SpringNetwork};
+use cloth_core::physics::Body;
+use cloth_core::physics::fabric::{self, Bending, Fabric, Material, Membrane, Rigidity, Surroundings};
+use cloth_core::physics::integrator::{Adaptive, Integrator, Scheme, StepError};
+use cloth_core::physics::mesh::{Diagonals, Plane, Sheet, SpringNetwork};
 use energy_solve::System;
 
 const CELLS: usize = 8;

@@ -1,7 +1,7 @@
 //! Results are bit-identical for one thread and two.
 
 use cloth_core::bench::{Cloth, hang};
-use cloth_core::integrator::{Integrator, Newton};
+use cloth_core::physics::integrator::{Integrator, Newton};
 
 #[test]
 fn a_hanging_sheet_is_bit_identical_on_one_thread_and_two() {

@@ -1,4 +1,4 @@
-//! Criterion's statistics of one run over all elements: `cargo bench -p energy-bench --bench kernels`.
+//! Criterion's statistics of one run over all elements: `cargo bench --manifest-path energy-bench/Cargo.toml --bench kernels`.
 
 #![allow(missing_docs)]
 

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Times C that SymPy and CasADi generate for the kernels of energy-bench, and TinyAD in C++.
 
-    cargo run --release -p energy-bench -- --inputs DIR
+    cargo run --release --manifest-path energy-bench/Cargo.toml -- --inputs DIR
     python3 symbolic_kernels.py DIR [--cc CC] [--repetitions N] [--json] [--keep DIR]
     python3 symbolic_kernels.py DIR --tinyad TINYAD/include EIGEN [--cxx CXX]
 

@@ -16,9 +16,11 @@
 // Formulas keep the symbols of their sources. Only a crate can allow these lints.
 #![allow(confusable_idents, mixed_script_confusables, uncommon_codepoints)]
 
-mod catalogue;
+#[cfg(feature = "catalogue")]
+pub mod catalogue;
+mod declarations;
 
-pub use catalogue::DECLARATIONS;
+pub use declarations::DECLARATIONS;
 
 macro_rules! elements {
     ($($file:ident: $($name:ident),+;)*) => {

@@ -3,4 +3,6 @@
 
 mod ipctk;
 mod lanes;
+mod laws;
+mod operations;
 mod rigid_motions;

@@ -5,7 +5,7 @@
 use std::path::Path;
 use std::process::Command;
 
-use energy_drill::Drill;
+use energy_files::drill::Drill;
 use tempfile::TempDir;
 
 /// Returns a folder with a recording of so many frames.

@@ -1,6 +1,6 @@
 """Overhead of calls from Python, and throughput of a large batch beside Rust.
 
-    cargo bench -p energy-catalogue --bench matrices --no-run      # prints the path of the program
+    cargo bench -p energy-elements --bench matrices --no-run      # prints the path of the program
     python python/benchmarks/calls.py [--rust PROGRAM]
 
 The overhead of a call is its time less that of the same elements in a large batch. Medians of the fastest rounds are
@@ -43,7 +43,7 @@ def table(rows):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--rust", help="the program of `cargo bench -p energy-catalogue --bench matrices`")
+    parser.add_argument("--rust", help="the program of `cargo bench -p energy-elements --bench matrices`")
     options = parser.parse_args()
     hinge, draw = ed.element("QuadraticHinge"), np.random.default_rng(1)
     one, x, out = hinge.bind(1, k=1.5, θ0=0.25), draw.normal(size=(1, 4, 3)), outputs(1, 4)

@@ -121,7 +121,7 @@ fn a_small_budget_leaves_inputs_and_faults_out_and_says_so() {
 #[test]
 fn reports_do_not_depend_on_the_number_of_threads() {
     let names = ["Spring", "StVK", "HairBend", "Distance", "NeoHookean"];
-    let targets = verify::audit::targets_in(energy_catalogue::catalogue(), &names).unwrap();
+    let targets = verify::audit::targets_in(energy_elements::catalogue::elements(), &names).unwrap();
     let report = |threads| {
         let options = Options { threads: std::num::NonZero::new(threads), ..options() };
         format!("{:?}", audit_all(&targets, None, options))

@@ -5,7 +5,7 @@ use anyhow::{Context, Result};
 use clap::{Args, ValueEnum};
 use cloth_core::bench::sleep::{self, Sizes};
 use cloth_core::bench::{self, Cloth, Measured, trajectory_error};
-use cloth_core::integrator::LinearSolverChoice;
+use cloth_core::physics::integrator::LinearSolverChoice;
 use indicatif::ProgressBar;
 
 use super::{positive, print, progress_bar};

@@ -1,7 +1,7 @@
 use anyhow::Result;
 use clap::Args;
 use clap::builder::PossibleValuesParser;
-use cloth_core::fabric::MEASURED;
+use cloth_core::physics::fabric::MEASURED;
 
 use super::print;
 

@@ -135,7 +135,7 @@ fn obj(input: &[u8], folder: &Path) -> Result<(), String> {
     let path = file(folder, "mesh.obj", input);
     let parsed = ObjFile::read(&path).map_err(message)?;
     assert!(parsed.uvs.as_flattened().iter().all(|&x| (x as f32).is_finite()), "a texture coordinate is not finite");
-    let cloth = cloth_core::mesh::read_obj(&path).map_err(message).map(|mesh| {
+    let cloth = cloth_core::physics::mesh::read_obj(&path).map_err(message).map(|mesh| {
         assert!(mesh.triangles().iter().flatten().all(|&vertex| vertex < mesh.vertices().len()));
     });
     match read_obj(&path) {

@@ -6,7 +6,7 @@ pub mod runs;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
-use cloth_core::geometry::Pose;
+use cloth_core::physics::geometry::Pose;
 use cloth_core::scene::Scene;
 use cloth_core::simulation::{Controls, OwnForce, SimulationError};
 use energy_dsl::Vector3;

@@ -1,6 +1,6 @@
 //! The derivatives of every element of the catalogue, compared with independent routes.
 
-use energy_catalogue::catalogue;
+use energy_elements::catalogue;
 use energy_dsl::AnyElement;
 use verify::audit::{Options, audit, describe_failure};
 use verify::parallel;
@@ -26,6 +26,6 @@ fn operations(entry: &AnyElement) -> usize {
 
 #[test]
 fn every_derivative_of_the_catalogue_passes_the_audit() {
-    let problems = parallel::map(catalogue(), None, operations, problems).concat();
+    let problems = parallel::map(catalogue::elements(), None, operations, problems).concat();
     assert!(problems.is_empty(), "\n{}", problems.join("\n"));
 }

@@ -6,12 +6,15 @@
 //! * [`sealed`] stores a state with its version and checksum, in two generations.
 //! * [`AppendFile`] grows next to such a state, and [`InputFile`] tells whether an input was edited.
 //! * [`printable`] shows a name without control characters, [`excerpt`] its start.
+//! * `drill`, with the feature of this name, fails and kills programs at each of these operations, for tests.
 //!
 //! A folder of results may come from a stranger as well, who may have put symbolic links, pipes or devices into it.
 //! Nothing here writes, locks or reads a state through a link in the folder.
 #![forbid(unsafe_code)]
 
 mod append;
+#[cfg(feature = "drill")]
+pub mod drill;
 mod fault;
 mod folder;
 mod input_file;

@@ -171,7 +171,7 @@ mod tests {
     fn elements_are_as_accurate_in_single_precision() {
         let mut beyond = Vec::new();
         let evaluations = energy_elements::for_each_element!(single_precision);
-        for (entry, evaluate) in energy_catalogue::catalogue().iter().zip(evaluations) {
+        for (entry, evaluate) in energy_elements::catalogue::elements().iter().zip(evaluations) {
             let declaration = entry.declaration;
             let subject = Target::of_element(entry).subject().unwrap();
             let auditor = Auditor::new(&subject);

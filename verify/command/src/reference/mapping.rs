@@ -1,4 +1,4 @@
-use energy_catalogue::find;
+use energy_elements::catalogue::find;
 use energy_dsl::AnyElement;
 
 /// The element that computes a reference potential, and the source of its parameters.

@@ -7,7 +7,7 @@ use energy_dsl::Vector3;
 ///
 /// ```
 /// let frames: [&[[f64; 3]]; 2] = [&[[1.0, 2.0, 3.0]], &[[1.5, 2.0, 3.0]]];
-/// let file = cloth_simulation::output::pc2_bytes(&frames);
+/// let file = cloth_core::output::pc2_bytes(&frames);
 /// assert!(file.starts_with(b"POINTCACHE2\0") && file.len() == 32 + 2 * 12);
 /// assert_eq!(file[44..48], 1.5_f32.to_le_bytes());
 /// ```
@@ -30,7 +30,7 @@ pub fn pc2_bytes(frames: &[&[Vector3<f64>]]) -> Vec<u8> {
 ///
 /// ```
 /// let frames: [&[[f64; 3]]; 2] = [&[[1.0, 2.0, 3.0]], &[[1.5, 2.0, 3.0]]];
-/// let file = cloth_simulation::output::mdd_bytes(&frames, 25.0);
+/// let file = cloth_core::output::mdd_bytes(&frames, 25.0);
 /// assert_eq!(file[..8], [0, 0, 0, 2, 0, 0, 0, 1]);
 /// assert_eq!(file[12..16], 0.04_f32.to_be_bytes());
 /// assert_eq!(file[28..32], 1.5_f32.to_be_bytes());

@@ -7,10 +7,10 @@ use energy_dsl::{
     BatchError, Declaration, Element, Flagged, Float, Packed, PackedForce, PackedPotential, PackedResidual, Routine,
     RoutineKind, Stored,
 };
-use energy_elements::for_each_element;
+use crate::for_each_element;
 
-use crate::batches::{Bind, CompiledBatch, Scalar};
-use crate::matrices::{hessian_matrices, jacobian_matrices};
+use super::batches::{Bind, CompiledBatch, Scalar};
+use super::matrices::{hessian_matrices, jacobian_matrices};
 
 /// Whether no routine of an element has more operations than the largest that is compiled.
 const fn is_small(declaration: &Declaration, largest: usize) -> bool {
@@ -33,8 +33,8 @@ const fn is_small(declaration: &Declaration, largest: usize) -> bool {
 macro_rules! table {
     ($($kind:ident $name:ident),*) => {
         &[$({
-            const IS_SMALL: bool = is_small(<energy_elements::$name<f64> as Element>::DECLARATION, LARGEST);
-            (stringify!($name), if IS_SMALL { Some($kind::<energy_elements::$name<_>, _> as Bind<_>) } else { None })
+            const IS_SMALL: bool = is_small(<crate::$name<f64> as Element>::DECLARATION, LARGEST);
+            (stringify!($name), if IS_SMALL { Some($kind::<crate::$name<_>, _> as Bind<_>) } else { None })
         }),*]
     };
 }

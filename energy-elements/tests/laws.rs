@@ -1,6 +1,6 @@
 //! Laws that hold exactly, and values known in closed form.
 
-use energy_catalogue::{catalogue, find};
+use energy_elements::catalogue;
 use energy_dsl::{Baseline, ForceLaw, Inputs, Kind, Level, LevelName, Outputs, Potential, level};
 use energy_elements::{
     BridsonBending, Distance, Gravity, HairBend, HingeAngle, HingeCosHalf, HingeSinHalf, HookeSpring, PowerLaw, Spring,
@@ -9,7 +9,7 @@ use energy_elements::{
 use proptest::prelude::*;
 
 fn evaluate(name: &str, parameters: &[f64], rest: &[f64], positions: &[f64], velocities: &[f64]) -> Outputs<f64> {
-    (find(name).unwrap().evaluate)(&Inputs { parameters, rest, positions, velocities }).unwrap()
+    (catalogue::find(name).unwrap().evaluate)(&Inputs { parameters, rest, positions, velocities }).unwrap()
 }
 
 fn block<'a>(outputs: &'a Outputs<f64>, name: &str) -> &'a [f64] {
@@ -23,7 +23,7 @@ fn points(n: usize) -> impl Strategy<Value = Vec<f64>> {
 
 /// Typical parameters and rest shape of an element.
 fn ordinary(name: &str) -> (Vec<f64>, Vec<f64>) {
-    let declaration = find(name).unwrap().declaration;
+    let declaration = catalogue::find(name).unwrap().declaration;
     let implied = if declaration.kind == Kind::Constraint { 2 } else { 0 };
     let parameters = declaration.parameters.iter().map(|p| p.size).sum::<usize>() + implied;
     let rest = match declaration.rest.iter().map(|field| field.size).sum::<usize>() {
@@ -43,7 +43,7 @@ proptest! {
     /// An exactly representable translation changes no bit of elements that depend on differences only.
     #[test]
     fn translation_is_exact(x in points(6), shift in points(1), v in points(6)) {
-        for entry in catalogue().iter().filter(|e| e.declaration.translation_invariant) {
+        for entry in catalogue::elements().iter().filter(|e| e.declaration.translation_invariant) {
             let (name, n) = (&*entry.declaration.name, 3 * entry.declaration.points.len());
             let (parameters, rest) = ordinary(name);
             let moved: Vec<f64> = x[..n].iter().enumerate().map(|(i, c)| c + shift[i % 3]).collect();
@@ -65,7 +65,7 @@ proptest! {
         let scaled = |exponent: i32| x.iter().map(|c| c * 2.0_f64.powi(exponent)).collect::<Vec<f64>>();
         let degrees = [("HingeAngle", 0), ("HingeSinHalf", 0), ("HingeCosHalf", 0), ("HingeCos", 0), ("Distance", 1)];
         for (name, degree) in degrees {
-            let n = 3 * find(name).unwrap().declaration.points.len();
+            let n = 3 * catalogue::find(name).unwrap().declaration.points.len();
             let [here, there] = [from, to].map(|exponent| evaluate(name, &[], &[], &scaled(exponent)[..n], &[]));
             for (order, block_name) in ["energy", "grad", "hess"].into_iter().enumerate() {
                 let power = 2.0_f64.powi(exponent * (degree - order as i32));
@@ -79,7 +79,7 @@ proptest! {
     /// Only one triangle of the Hessian is computed, so the Hessian and its diagonal blocks are exactly symmetric.
     #[test]
     fn hessians_are_exactly_symmetric(x in points(6)) {
-        for entry in catalogue().iter().filter(|e| e.declaration.kind == Kind::Energy) {
+        for entry in catalogue::elements().iter().filter(|e| e.declaration.kind == Kind::Energy) {
             let (name, n) = (&*entry.declaration.name, 3 * entry.declaration.points.len());
             let (parameters, rest) = ordinary(name);
             let outputs = evaluate(name, &parameters, &rest, &x[..n], &[]);
@@ -101,7 +101,7 @@ proptest! {
             ("ZeroLengthSpring", vec![3.0, 7.0], vec![3.0, 0.0]),
             ("BridsonForceDamped", vec![2.0, 7.0, 0.25], vec![2.0, 0.0, 0.25]),
         ] {
-            let n = 3 * find(name).unwrap().declaration.points.len();
+            let n = 3 * catalogue::find(name).unwrap().declaration.points.len();
             let damped = evaluate(name, &parameters, &[], &x[..n], &v[..n]);
             let undamped = evaluate(name, &still, &[], &x[..n], &v[..n]);
             prop_assert_eq!(block(&damped, "force"), block(&undamped, "force"), "{}", name);
@@ -295,7 +295,7 @@ fn declarations_say_what_solvers_may_skip() {
         ("BridsonForce", true, false, false),
         ("BridsonForceDamped", true, true, false),
     ] {
-        let declaration = find(name).unwrap().declaration;
+        let declaration = catalogue::find(name).unwrap().declaration;
         let found = (declaration.curved, declaration.velocity_dependent, declaration.symmetric);
         assert_eq!(found, (curved, velocity_dependent, symmetric), "{name}");
     }

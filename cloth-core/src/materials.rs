@@ -1,8 +1,4 @@
 //! The elements that simulations are made of, and text descriptions of all declared elements.
-//!
-//! They are a crate of their own because this table compiles scalar routines that only audits call. It builds while
-//! other crates build, and with less optimisation.
-#![forbid(unsafe_code)]
 
 use std::fmt::Write as _;
 
@@ -64,8 +60,8 @@ pub fn listing() -> String {
 /// Describes one declared element.
 ///
 /// ```
-/// let spring = cloth_materials::element("HookeSpring").unwrap();
-/// let text = cloth_materials::describe(spring.declaration);
+/// let spring = cloth_core::materials::element("HookeSpring").unwrap();
+/// let text = cloth_core::materials::describe(spring.declaration);
 /// assert!(text.starts_with("HookeSpring (energy)") && text.contains("K [N/m]"));
 /// ```
 #[must_use]

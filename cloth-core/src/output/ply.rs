@@ -5,7 +5,7 @@ use energy_dsl::Vector3;
 ///
 /// ```
 /// let x = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
-/// let file = cloth_simulation::output::ply_bytes(&x, &[[0.5; 3]; 3], &[], &[[0, 1, 2]]);
+/// let file = cloth_core::output::ply_bytes(&x, &[[0.5; 3]; 3], &[], &[[0, 1, 2]]);
 /// let head = String::from_utf8_lossy(&file);
 /// assert!(head.starts_with("ply\nformat binary_little_endian 1.0\n") && head.contains("element vertex 3\n"));
 /// assert_eq!(file.len(), head.find("end_header\n").unwrap() + 11 + 3 * 24 + 13);

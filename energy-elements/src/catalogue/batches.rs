@@ -27,7 +27,7 @@ pub trait CompiledBatch<S>: Send + Sync {
 ///
 /// ```
 /// # #[cfg(feature = "batches")] {
-/// use energy_catalogue::bind;
+/// use energy_elements::catalogue::bind;
 /// use energy_dsl::RoutineKind;
 ///
 /// // HookeSpring(p, q; k, L): U = k/2 (‖p − q‖ − L)².

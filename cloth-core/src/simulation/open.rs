@@ -180,8 +180,8 @@ impl Simulation {
     /// Creates a simulation of a scene that a program controls.
     ///
     /// ```
-    /// use cloth_simulation::Simulation;
-    /// use cloth_simulation::simulation::Controls;
+    /// use cloth_core::Simulation;
+    /// use cloth_core::simulation::Controls;
     /// # use cloth_scene::Scene;
     /// # let text = r#"
     /// # dt = 0.01

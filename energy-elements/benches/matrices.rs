@@ -1,11 +1,11 @@
 //! Nanoseconds per hinge for value, gradient and full Hessian of 10,000 hinges, row by row, as the Python package
-//! writes them: `cargo bench -p energy-catalogue --bench matrices`. `python/benchmarks/calls.py` runs it in turns with
+//! writes them: `cargo bench -p energy-elements --bench matrices`. `python/benchmarks/calls.py` runs it in turns with
 //! calls from Python.
 #![allow(missing_docs)]
 
 // Only the kernel of hinges is compiled, not those of the feature `batches`.
 #[expect(dead_code, reason = "the part for forces")]
-#[path = "../src/matrices.rs"]
+#[path = "../src/catalogue/matrices.rs"]
 mod matrices;
 
 use std::hint::black_box;

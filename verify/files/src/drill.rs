@@ -1,10 +1,8 @@
 //! Drills of programs that write files: failures of single operations, full disks and kills.
 //!
 //! After each, files with final names must be whole, and another try must give the results of an undisturbed program,
-//! bit by bit. `energy_files` injects failures in builds with debug assertions, as the environment variable
+//! bit by bit. This crate injects failures in builds with debug assertions, as the environment variable
 //! `ENERGY_FAULT` says.
-#![forbid(unsafe_code)]
-
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitStatus, Stdio};
 use std::time::{Duration, Instant};

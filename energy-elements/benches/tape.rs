@@ -1,4 +1,4 @@
-//! Compares the block tape with compiled lanes: `cargo bench -p energy-catalogue --bench tape`. Names of elements after
+//! Compares the block tape with compiled lanes: `cargo bench -p energy-elements --bench tape`. Names of elements after
 //! `--` select some.
 //!
 //! Prints nanoseconds per element for each routine, the ratio of tape to compiled lanes, the geometric mean and the
