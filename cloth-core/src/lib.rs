@@ -46,7 +46,9 @@
 #[cfg(doctest)]
 mod book;
 
+#[cfg(feature = "program")]
 pub mod bench;
+#[cfg(feature = "program")]
 pub mod demo;
 pub mod ledger;
 pub mod materials;
@@ -55,7 +57,9 @@ pub mod output;
 pub mod run;
 pub mod simulation;
 pub mod sweep;
+#[cfg(feature = "program")]
 pub mod validate;
+#[cfg(feature = "program")]
 pub mod view;
 
 pub use cloth_physics as physics;

@@ -46,7 +46,8 @@ fn squeezed() -> Body {
     let scene = Scene::parse(scene, "scene.toml".as_ref()).unwrap();
     let shape = scene.garments[0].shape(&scene.folder).unwrap();
     let nothing = cloth_core::physics::fabric::Surroundings { gravity: [0.0, 0.0, -9.81], drag: 0.0 };
-    let garment = cloth_core::physics::fabric::terms(&scene.garments[0].fabric, &shape.mesh, &shape.springs, &nothing).unwrap();
+    let garment =
+        cloth_core::physics::fabric::terms(&scene.garments[0].fabric, &shape.mesh, &shape.springs, &nothing).unwrap();
     let x: Vec<[f64; 3]> = shape.start.iter().map(|p| [0.7 * p[0], 0.8 * p[1], 0.01 * (30.0 * p[0]).sin()]).collect();
     let system = energy_solve::System::new(garment.terms, &vec![false; x.len()]).unwrap();
     assert!(Simulation::new(&scene).unwrap().step().is_ok());

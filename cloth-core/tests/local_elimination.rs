@@ -3,8 +3,8 @@
 use cloth_core::physics::fabric::{Bending, Fabric, Material, Membrane, Rayleigh, Rigidity, Surroundings, terms};
 use cloth_core::physics::integrator::{Integrator, Newton, NewtonOptions, StepReport};
 use cloth_core::physics::mesh::{Diagonals, Plane, Sheet, SpringNetwork, TriangleMesh};
-use cloth_core::scene::Scene;
 use cloth_core::physics::wind::Wind;
+use cloth_core::scene::Scene;
 use cloth_core::{Simulation, physics::Body};
 use energy_dsl::{Declaration, Element, Vector3};
 use energy_elements::Gravity;

@@ -1,8 +1,8 @@
 //! Scenes with several parts: contact, friction, wind, moving pins, seams, hair, and the energy ledger.
 
 use cloth_core::Simulation;
-use cloth_core::physics::fabric::MEASURED;
 use cloth_core::materials::element;
+use cloth_core::physics::fabric::MEASURED;
 use cloth_core::scene::Scene;
 
 const SOFT: &str = "[garment.fabric]\ndensity = 0.2\n[garment.fabric.material.stvk]\nstretch_stiffness = 40.0\n\

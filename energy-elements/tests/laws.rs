@@ -1,7 +1,7 @@
 //! Laws that hold exactly, and values known in closed form.
 
-use energy_elements::catalogue;
 use energy_dsl::{Baseline, ForceLaw, Inputs, Kind, Level, LevelName, Outputs, Potential, level};
+use energy_elements::catalogue;
 use energy_elements::{
     BridsonBending, Distance, Gravity, HairBend, HingeAngle, HingeCosHalf, HingeSinHalf, HookeSpring, PowerLaw, Spring,
     StVK, TetAsRigidAsPossible, TetCorotational, TetStVK, TetStableNeoHookean, ViscousDrag, ZeroLengthSpring,

@@ -2,9 +2,9 @@
 //! an exact rounding-error term as one. The tests of the ordinary path are included: that its results are finite, and
 //! that parameters are far from overflow.
 
-use energy_elements::catalogue::find;
 use energy_dsl::Element;
 use energy_dsl::energy;
+use energy_elements::catalogue::find;
 
 energy! {
     /// The membrane as a function of the columns of F.

@@ -3,11 +3,11 @@
 use std::borrow::Cow;
 use std::ops::Range;
 
+use crate::for_each_element;
 use energy_dsl::{
     BatchError, Declaration, Element, Flagged, Float, Packed, PackedForce, PackedPotential, PackedResidual, Routine,
     RoutineKind, Stored,
 };
-use crate::for_each_element;
 
 use super::batches::{Bind, CompiledBatch, Scalar};
 use super::matrices::{hessian_matrices, jacobian_matrices};

@@ -1,7 +1,7 @@
 //! The derivatives of every element of the catalogue, compared with independent routes.
 
-use energy_elements::catalogue;
 use energy_dsl::AnyElement;
+use energy_elements::catalogue;
 use verify::audit::{Options, audit, describe_failure};
 use verify::parallel;
 

@@ -3,10 +3,10 @@
 
 use std::path::Path;
 
-use energy_elements::catalogue;
 use energy_compiler::{InputKind, Interpreted};
 use energy_dsl::tape::Column;
 use energy_dsl::{AnyElement, Declaration, Inputs, Kind, Outputs};
+use energy_elements::catalogue;
 use verify::sample::{Sample, Sampler};
 use verify_command::reference::{Record, mapping};
 use verify_command::stress::sweeps;
@@ -90,7 +90,9 @@ fn every_reference_record_has_the_bits_of_generated_code() {
 /// compares with one at a time.
 #[test]
 fn blocks_have_the_bits_of_single_elements() {
-    for entry in catalogue::elements().iter().filter(|entry| matches!(entry.declaration.kind, Kind::Energy | Kind::Residual)) {
+    for entry in
+        catalogue::elements().iter().filter(|entry| matches!(entry.declaration.kind, Kind::Energy | Kind::Residual))
+    {
         let element = element(entry.declaration);
         let sound = |sample: &Sample| element.check_rest(&sample.inputs()).is_ok();
         let samples: Vec<Sample> = samples(entry.declaration).into_iter().filter(sound).collect();

@@ -1,127 +1,22 @@
-//! Fabrics made of elements that a file declares, read at run time.
+//! Compiles a file's declarations, and binds their elements to the parts of a mesh.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::{Path, PathBuf};
 
 use energy_compiler::{BindError, Interpreted, canonical_name};
 use energy_dsl::tape::Column;
 use energy_dsl::{Declaration, Field, Kind, Vector3};
 use energy_solve::TapeTerm;
-use schemars::JsonSchema;
-use serde::Deserialize;
 
-use super::Bending;
-use crate::bounded::{RealMap, Signed};
+use super::{Declared, DeclaredError, TargetMesh};
 use crate::geometry::{norm, subtract};
-use crate::mesh::{MaterialTriangle, Topology, TriangleMesh, lumped_masses, rest_angle};
+use crate::mesh::{MaterialTriangle, Topology, lumped_masses, rest_angle};
 
 /// The largest size of an `.energy` file, in bytes.
 const LARGEST_FILE: u64 = 16 << 20;
 
-/// Elements declared in your own `.energy` file. Each energy acts on every vertex, edge, triangle or hinge, depending
-/// on whether it has one, two, three or four points. The points of a hinge are its two apexes, then the shared edge.
-/// The elements are interpreted, a block of them at a time, with the bits of generated code.
-///
-/// A rest shape consists of the rest position of each point (`Vec3`), or, for a triangle, of the corners in its plane
-/// with the first axis along the warp (`Vec2`).
-///
-/// Parameters come from `parameters`. A parameter that is not given there has a default if its name is one of these:
-/// `L`, the rest length of an edge; `A`, the rest area of a triangle; `θ0`, the rest angle of a hinge; `m`, the mass of
-/// a vertex.
-#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct Declared {
-    /// Path, relative to the scene file's folder.
-    pub path: PathBuf,
-    /// Names of the declarations to use. Default all in the file.
-    #[serde(default)]
-    pub elements: Option<Vec<String>>,
-    /// Parameters by name, in the units of the declaration. `θ0`, `θ₀` and `theta0` are equivalent.
-    #[serde(default, with = "RealMap::<Signed>")]
-    pub parameters: BTreeMap<String, f64>,
-    /// Additional bending resistance. Default none.
-    #[serde(default)]
-    pub bending: Bending,
-}
-
-/// A file that cannot serve as a fabric.
-#[derive(Debug, thiserror::Error)]
-#[expect(missing_docs, reason = "the messages name the fields")]
-pub enum DeclaredError {
-    /// The file cannot be read.
-    #[error("cannot read {}", .path.display())]
-    Unreadable { path: PathBuf, source: std::io::Error },
-    /// The file does not compile.
-    #[error("{diagnostics}")]
-    Text {
-        /// The compiler's errors, with their places.
-        diagnostics: String,
-    },
-    /// The file declares no element of this name.
-    #[error("{} declares no element called `{name}`; it declares {}", .path.display(), .known.join(", "))]
-    NoSuchElement {
-        path: PathBuf,
-        name: String,
-        /// The names that it declares.
-        known: Vec<String>,
-    },
-    /// The file declares no element.
-    #[error("{} declares nothing", .path.display())]
-    Empty { path: PathBuf },
-    /// An element is not an energy of one to four points.
-    #[error("{}: {element} is {what}; a material consists of energies of one to four points", .path.display())]
-    Unfit {
-        path: PathBuf,
-        element: String,
-        /// A description of the element.
-        what: String,
-    },
-    /// A parameter is not given and has no default.
-    #[error(
-        "{}: {element} needs the parameter `{parameter}`{unit}; give it as `parameters.{parameter}`",
-        .path.display()
-    )]
-    Missing {
-        path: PathBuf,
-        element: String,
-        parameter: String,
-        /// Its unit, in brackets.
-        unit: String,
-    },
-    /// No element has a parameter of this name.
-    #[error("{}: no element has a parameter `{parameter}`; expected {}", .path.display(), one_of(.known))]
-    Unused {
-        path: PathBuf,
-        parameter: String,
-        /// The parameters of all elements.
-        known: Vec<String>,
-    },
-    /// An element rejects a rest shape.
-    #[error("{}: on vertices {vertices:?}: {source}", .path.display())]
-    Rest { path: PathBuf, vertices: Vec<usize>, source: energy_dsl::RestError },
-}
-
-/// Returns a list of names for a message.
-fn one_of(names: &[String]) -> String {
-    match names {
-        [] => "none".into(),
-        names => format!("`{}`", names.join("`, `")),
-    }
-}
-
-/// The mesh that the elements act on.
-pub(super) struct TargetMesh<'a> {
-    pub mesh: &'a TriangleMesh,
-    pub triangles: &'a [MaterialTriangle],
-    pub density: f64,
-    /// Offset of its vertices in the system.
-    pub first: usize,
-    pub prefix: &'a str,
-}
-
 impl Declared {
     /// Returns a term for each element used.
-    pub(super) fn terms(&self, target: &TargetMesh<'_>) -> Result<Vec<TapeTerm>, DeclaredError> {
+    pub(in super::super) fn terms(&self, target: &TargetMesh<'_>) -> Result<Vec<TapeTerm>, DeclaredError> {
         let elements = self.read()?;
         let known: BTreeSet<String> = elements
             .iter()
@@ -262,7 +157,7 @@ fn sites(points: usize, target: &TargetMesh<'_>) -> Option<Vec<Site>> {
             let triangles = mesh.triangles().iter().zip(target.triangles);
             let triangle = |(corners, corners_in_plane): (&[usize; 3], &MaterialTriangle)| Site {
                 corners_in_plane: Some(*corners_in_plane),
-                ..site(corners, ("A", super::terms::area(*corners_in_plane)))
+                ..site(corners, ("A", crate::fabric::terms::area(*corners_in_plane)))
             };
             triangles.map(triangle).collect()
         }
@@ -272,11 +167,4 @@ fn sites(points: usize, target: &TargetMesh<'_>) -> Option<Vec<Site>> {
         }
         _ => return None,
     })
-}
-
-impl Declared {
-    /// Resolves the path of the file relative to a folder.
-    pub fn resolve_path(&mut self, folder: &Path) {
-        self.path = folder.join(&self.path);
-    }
 }
