@@ -1,5 +1,6 @@
 //! The structure of the workspace: no import cycle between the top-level modules of a crate, no dependency cycle
-//! between crates, no path in `ARCHITECTURE.md` that does not exist, and no file of tests that nothing runs.
+//! between crates, no path in `ARCHITECTURE.md` that does not exist, no arrow between crates that its picture lacks, and
+//! no file of tests that nothing runs.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -215,10 +216,39 @@ fn crates_do_not_depend_on_each_other_in_a_cycle() {
         let manifest = manifest(folder);
         let kinds = ["dependencies", "dev-dependencies", "build-dependencies"];
         let tables = kinds.iter().filter_map(|kind| manifest.get(*kind)?.as_table());
-        let dependencies = tables.flat_map(|table| table.keys()).filter(|on| names.contains(on.as_str()));
+        // Tests may ask for features of their own crate.
+        let dependencies =
+            tables.flat_map(|table| table.keys()).filter(|on| names.contains(on.as_str()) && *on != name);
         graph.insert(name.clone(), dependencies.cloned().collect());
     }
     assert_eq!(cycle(&graph), None, "dependencies, development dependencies included, form a cycle");
+}
+
+/// Returns the arrows of a picture in which lines read `crate → crate, crate`, and may go on in the next line.
+fn drawn_arrows(document: &str) -> Graph {
+    let picture = document.split("```").nth(1).expect("a picture in a block of text");
+    let joined = picture.replace(",\n", ", ");
+    let mut arrows = Graph::new();
+    for line in joined.lines().skip(1).filter(|line| !line.trim().is_empty()) {
+        let (from, to) = line.split_once('→').unwrap_or((line.split_whitespace().next().unwrap_or_default(), ""));
+        let to = to.split(',').map(|name| name.trim().to_owned()).filter(|name| !name.is_empty());
+        arrows.insert(from.trim().to_owned(), to.collect());
+    }
+    arrows
+}
+
+#[test]
+fn the_picture_in_the_architecture_has_every_arrow_between_crates() {
+    let crates = crates();
+    let uses = |folder: &Path| -> BTreeSet<String> {
+        let manifest = manifest(folder);
+        let names =
+            manifest.get("dependencies").and_then(toml::Value::as_table).into_iter().flat_map(toml::Table::keys);
+        names.filter(|on| crates.iter().any(|(name, _)| name == *on)).cloned().collect()
+    };
+    let arrows: Graph = crates.iter().map(|(name, folder)| (name.clone(), uses(folder))).collect();
+    let document = std::fs::read_to_string(workspace().join("ARCHITECTURE.md")).unwrap();
+    assert_eq!(drawn_arrows(&document), arrows, "left: the picture in ARCHITECTURE.md; right: the manifests");
 }
 
 /// Returns all crates that a crate of the workspace builds, as far as manifests of the workspace name them.
