@@ -3,9 +3,9 @@
 //! calls from Python.
 #![allow(missing_docs)]
 
-// Only the kernel of hinges is compiled, not those of the feature `batches`.
+// The Python package compiles such kernels for all elements.
 #[expect(dead_code, reason = "the part for forces")]
-#[path = "../src/catalogue/matrices.rs"]
+#[path = "../../python/src/compiled/matrices.rs"]
 mod matrices;
 
 use std::hint::black_box;

@@ -107,7 +107,7 @@ macro_rules! declarations {
 }
 
 /// The declarations of all elements of this crate, in alphabetical order. A crate that only reads them compiles no
-/// routine of the elements; `catalogue::elements` has these, too.
+/// routine of the elements.
 ///
 /// ```
 /// let spring = energy_elements::DECLARATIONS.iter().find(|declaration| declaration.name == "Spring").unwrap();

@@ -16,8 +16,6 @@
 // Formulas keep the symbols of their sources. Only a crate can allow these lints.
 #![allow(confusable_idents, mixed_script_confusables, uncommon_codepoints)]
 
-#[cfg(feature = "catalogue")]
-pub mod catalogue;
 mod declarations;
 
 pub use declarations::DECLARATIONS;

@@ -1,7 +1,7 @@
 //! Laws that hold exactly, and values known in closed form.
 
+use crate::catalogue;
 use energy_dsl::{Baseline, ForceLaw, Inputs, Kind, Level, LevelName, Outputs, Potential, level};
-use energy_elements::catalogue;
 use energy_elements::{
     BridsonBending, Distance, Gravity, HairBend, HingeAngle, HingeCosHalf, HingeSinHalf, HookeSpring, PowerLaw, Spring,
     StVK, TetAsRigidAsPossible, TetCorotational, TetStVK, TetStableNeoHookean, ViscousDrag, ZeroLengthSpring,
@@ -43,7 +43,7 @@ proptest! {
     /// An exactly representable translation changes no bit of elements that depend on differences only.
     #[test]
     fn translation_is_exact(x in points(6), shift in points(1), v in points(6)) {
-        for entry in catalogue::elements().iter().filter(|e| e.declaration.translation_invariant) {
+        for entry in catalogue::ELEMENTS.iter().filter(|e| e.declaration.translation_invariant) {
             let (name, n) = (&*entry.declaration.name, 3 * entry.declaration.points.len());
             let (parameters, rest) = ordinary(name);
             let moved: Vec<f64> = x[..n].iter().enumerate().map(|(i, c)| c + shift[i % 3]).collect();
@@ -79,7 +79,7 @@ proptest! {
     /// Only one triangle of the Hessian is computed, so the Hessian and its diagonal blocks are exactly symmetric.
     #[test]
     fn hessians_are_exactly_symmetric(x in points(6)) {
-        for entry in catalogue::elements().iter().filter(|e| e.declaration.kind == Kind::Energy) {
+        for entry in catalogue::ELEMENTS.iter().filter(|e| e.declaration.kind == Kind::Energy) {
             let (name, n) = (&*entry.declaration.name, 3 * entry.declaration.points.len());
             let (parameters, rest) = ordinary(name);
             let outputs = evaluate(name, &parameters, &rest, &x[..n], &[]);

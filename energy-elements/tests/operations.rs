@@ -2,9 +2,9 @@
 //! an exact rounding-error term as one. The tests of the ordinary path are included: that its results are finite, and
 //! that parameters are far from overflow.
 
+use crate::catalogue::find;
 use energy_dsl::Element;
 use energy_dsl::energy;
-use energy_elements::catalogue::find;
 
 energy! {
     /// The membrane as a function of the columns of F.
@@ -40,7 +40,7 @@ fn hessians_stay_small() {
 
 #[test]
 fn routines_leave_out_what_was_not_asked_for() {
-    for entry in energy_elements::catalogue::elements().iter().filter(|e| e.declaration.curved) {
+    for entry in crate::catalogue::ELEMENTS.iter().filter(|e| e.declaration.curved) {
         let declaration = entry.declaration;
         if !declaration.routines.iter().any(|r| r.name == "hessian") {
             continue;

@@ -11,7 +11,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyFloat, PyInt, PyTuple};
 
 /// A precision that elements are evaluated in.
-pub trait Precision: energy_elements::catalogue::Scalar + numpy::Element + PartialOrd {
+pub trait Precision: crate::compiled::Scalar + numpy::Element + PartialOrd {
     /// Name of the dtype.
     const DTYPE: &'static str;
 }

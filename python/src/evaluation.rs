@@ -2,7 +2,6 @@
 
 use std::ops::Range;
 
-use energy_elements::catalogue::CompiledBatch;
 use energy_compiler::{Elements as Tapes, EvaluateError, InputKind, Interpreted};
 use energy_dsl::tape::TAPE_BLOCK;
 use energy_dsl::{Flagged, RoutineKind};
@@ -11,6 +10,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
 
 use crate::arrays::{Precision, Shape, Slot, array, numbers, outputs, tuple, writable, wrong_shape};
+use crate::compiled::{CompiledBatch, bind};
 use crate::element::{Element, Origin, count};
 use crate::errors::wrong;
 
@@ -150,7 +150,7 @@ impl<S: Precision> Batch<S> {
         let part = |start: usize| {
             let range = start..tapes.len().min(start + size);
             let numbers = |element: usize| tapes.tape().numbers_of(range.start + element);
-            let compiled = if is_of_library { energy_elements::catalogue::bind(name, range.len(), numbers) } else { None };
+            let compiled = if is_of_library { bind(name, range.len(), numbers) } else { None };
             Part { range, compiled }
         };
         let parts = starts.map(part).collect();

@@ -1,6 +1,7 @@
 //! The compiled half of the Python package `energy_dsl`: elements from text, sums over meshes, cloth.
 
 mod arrays;
+mod compiled;
 mod element;
 mod errors;
 mod evaluation;

@@ -21,9 +21,8 @@ pub fn listings(name: &str) -> anyhow::Result<Vec<Listing>> {
         anyhow::ensure!(!all.is_empty(), "{name} contains no declaration");
         return Ok(all);
     }
-    let names =
-        || energy_elements::catalogue::elements().iter().map(|e| &*e.declaration.name).collect::<Vec<_>>().join(", ");
-    let entry = energy_elements::catalogue::find(name)
-        .with_context(|| format!("there is no element `{name}`; there are {}", names()))?;
+    let names = || crate::catalogue::elements().iter().map(|e| &*e.declaration.name).collect::<Vec<_>>().join(", ");
+    let entry =
+        crate::catalogue::find(name).with_context(|| format!("there is no element `{name}`; there are {}", names()))?;
     Listing::from_source(&entry.declaration.source).map_err(|errors| anyhow::anyhow!("{name}:{errors}"))
 }

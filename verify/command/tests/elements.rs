@@ -1,9 +1,9 @@
 //! The derivatives of every element of the catalogue, compared with independent routes.
 
 use energy_dsl::AnyElement;
-use energy_elements::catalogue;
 use verify::audit::{Options, audit, describe_failure};
 use verify::parallel;
+use verify_command::catalogue;
 
 /// The comparisons that `assert_derivatives!` makes for an element.
 fn options() -> Options {

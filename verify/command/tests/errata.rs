@@ -18,7 +18,7 @@ fn audited(name: &str, energy: Option<&str>) -> Report {
     let find = |name: &str| all.iter().find(|target| target.name() == name).cloned();
     let energy = energy.map(|energy| {
         find(energy)
-            .unwrap_or_else(|| Target::of_element(energy_elements::catalogue::find(energy).expect("a declared energy")))
+            .unwrap_or_else(|| Target::of_element(verify_command::catalogue::find(energy).expect("a declared energy")))
     });
     let target = find(name).unwrap_or_else(|| panic!("{name} is not in the file"));
     audit_all(&[target], energy.as_ref(), Options { mutations: 0, ..Options::quick() })

@@ -6,8 +6,8 @@ use std::path::Path;
 use energy_compiler::{InputKind, Interpreted};
 use energy_dsl::tape::Column;
 use energy_dsl::{AnyElement, Declaration, Inputs, Kind, Outputs};
-use energy_elements::catalogue;
 use verify::sample::{Sample, Sampler};
+use verify_command::catalogue;
 use verify_command::reference::{Record, mapping};
 use verify_command::stress::sweeps;
 

@@ -142,7 +142,7 @@ mod tests {
     use super::*;
     use crate::multiprecision::truth_of_ordinary;
     use crate::sample::Sampler;
-    use energy_dsl::{Element, Inputs, Outputs, RestError};
+    use energy_dsl::{AnyElement, Element, Inputs, Outputs, RestError};
 
     const SINGLE_ROUNDOFF: f64 = f32::EPSILON as f64 / 2.0;
 
@@ -153,8 +153,13 @@ mod tests {
     type EvaluateSingle = fn(&Inputs<'_, f32>) -> Result<Outputs<f32>, RestError>;
 
     macro_rules! single_precision {
-        ($($name:ident),* $(,)?) => { [$(energy_elements::$name::<f32>::evaluate::<f32> as EvaluateSingle),*] };
+        ($($name:ident),* $(,)?) => { &[$((
+            AnyElement::of::<energy_elements::$name<f64>>(),
+            energy_elements::$name::<f32>::evaluate::<f32> as EvaluateSingle,
+        )),*] };
     }
+
+    const ELEMENTS: &[(AnyElement, EvaluateSingle)] = energy_elements::for_each_element!(single_precision);
 
     /// Evaluates an element's blocks in single precision.
     fn in_single_precision(evaluate: EvaluateSingle, sample: &Sample) -> Vec<(&'static str, Vec<f64>)> {
@@ -170,8 +175,7 @@ mod tests {
     #[test]
     fn elements_are_as_accurate_in_single_precision() {
         let mut beyond = Vec::new();
-        let evaluations = energy_elements::for_each_element!(single_precision);
-        for (entry, evaluate) in energy_elements::catalogue::elements().iter().zip(evaluations) {
+        for (entry, evaluate) in ELEMENTS {
             let declaration = entry.declaration;
             let subject = Target::of_element(entry).subject().unwrap();
             let auditor = Auditor::new(&subject);
@@ -182,7 +186,7 @@ mod tests {
                 let [parameters, rest, positions, velocities] = [parameters, rest, positions, velocities].map(rounded);
                 let sample = Sample { parameters, rest, positions, velocities };
                 let answer = subject.answer(&sample).unwrap();
-                let got = in_single_precision(evaluate, &sample);
+                let got = in_single_precision(*evaluate, &sample);
                 for truth in truth_of_ordinary(declaration, &subject.formula, &sample, 12).blocks {
                     let name = truth.block.name;
                     let numbers = &got.iter().find(|(found, _)| *found == name.name()).unwrap().1;

@@ -72,9 +72,10 @@ pub fn worse(a: f64, b: f64) -> f64 {
 ///
 /// ```
 /// use energy_compiler::Textbook;
+/// use energy_dsl::Element;
 /// use verify::{BlockName, Sample, multiprecision::truth};
 ///
-/// let bend = energy_elements::catalogue::find("HairBend").unwrap().declaration;
+/// let bend = energy_elements::HairBend::<f64>::DECLARATION;
 /// let formula = Textbook::from_source(&bend.source).unwrap();
 /// // A turn by 1e-8: 1 − cos has no digit left in doubles.
 /// let sample = Sample {

@@ -37,7 +37,7 @@ pub fn bench(wanted: &[String]) -> Result<Vec<Measured>, String> {
         if !wanted.is_empty() && !wanted.iter().any(|w| w == name) {
             continue;
         }
-        let entry = energy_elements::catalogue::find(name).ok_or_else(|| format!("{name} is not in the catalogue"))?;
+        let entry = crate::catalogue::find(name).ok_or_else(|| format!("{name} is not in the catalogue"))?;
         let subject = Target::of_element(entry).subject()?;
         let mut sampler = subject.sampler(3);
         let samples: Vec<Sample> = (0..INPUTS).map(|_| in_single_precision(sampler.sample())).collect();

@@ -8,7 +8,7 @@ use verify::audit::{Target, targets_in};
 pub fn targets(names: &[String], file: Option<&Path>) -> anyhow::Result<Vec<Target>> {
     let Some(file) = file else {
         let names: Vec<&str> = names.iter().map(String::as_str).collect();
-        return targets_in(energy_elements::catalogue::elements(), &names).map_err(anyhow::Error::msg);
+        return targets_in(verify_command::catalogue::elements(), &names).map_err(anyhow::Error::msg);
     };
     let notice = Notice::of(format!("compiling {} …", file.display()));
     let all = Target::of_file(file)?;
@@ -24,6 +24,6 @@ pub fn targets(names: &[String], file: Option<&Path>) -> anyhow::Result<Vec<Targ
 pub fn energy_target(name: &str, file: Option<&Path>) -> anyhow::Result<Target> {
     let own = file.map(Target::of_file).transpose()?.unwrap_or_default();
     let found = own.into_iter().find(|target| target.name() == name);
-    let found = found.or_else(|| energy_elements::catalogue::find(name).map(Target::of_element));
+    let found = found.or_else(|| verify_command::catalogue::find(name).map(Target::of_element));
     found.with_context(|| format!("neither the file nor the catalogue has an energy `{name}`"))
 }

@@ -1,5 +1,5 @@
+use crate::catalogue::find;
 use energy_dsl::AnyElement;
-use energy_elements::catalogue::find;
 
 /// The element that computes a reference potential, and the source of its parameters.
 #[derive(Clone, Copy, Debug)]

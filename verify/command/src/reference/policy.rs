@@ -182,7 +182,7 @@ mod tests {
     /// Straight hair: the textbook form's Hessian loses its digits there, but not at its neighbours.
     #[test]
     fn a_regular_block_must_continue_its_neighbours() {
-        let entry = energy_elements::catalogue::find("HairBend").unwrap();
+        let entry = crate::catalogue::find("HairBend").unwrap();
         let sample = Sample {
             parameters: vec![2.0],
             rest: Vec::new(),

@@ -3,14 +3,14 @@
 use std::borrow::Cow;
 use std::ops::Range;
 
-use crate::for_each_element;
 use energy_dsl::{
     BatchError, Declaration, Element, Flagged, Float, Packed, PackedForce, PackedPotential, PackedResidual, Routine,
     RoutineKind, Stored,
 };
+use energy_elements::for_each_element;
 
-use super::batches::{Bind, CompiledBatch, Scalar};
 use super::matrices::{hessian_matrices, jacobian_matrices};
+use super::{Bind, CompiledBatch, Scalar};
 
 /// Whether no routine of an element has more operations than the largest that is compiled.
 const fn is_small(declaration: &Declaration, largest: usize) -> bool {
@@ -28,13 +28,11 @@ const fn is_small(declaration: &Declaration, largest: usize) -> bool {
     true
 }
 
-// `LARGEST` is in scope where the table is made: in a function that is not inlined. With a constant of the trait, each
-// crate that uses it would compile all kernels.
 macro_rules! table {
     ($($kind:ident $name:ident),*) => {
         &[$({
-            const IS_SMALL: bool = is_small(<crate::$name<f64> as Element>::DECLARATION, LARGEST);
-            (stringify!($name), if IS_SMALL { Some($kind::<crate::$name<_>, _> as Bind<_>) } else { None })
+            const IS_SMALL: bool = is_small(<energy_elements::$name<f64> as Element>::DECLARATION, LARGEST);
+            (stringify!($name), if IS_SMALL { Some($kind::<energy_elements::$name<_>, _> as Bind<_>) } else { None })
         }),*]
     };
 }

@@ -1,4 +1,9 @@
-//! Compiled elements with bound parameters, behind one interface for all types.
+//! Compiled elements of the library with bound parameters, behind one interface for all types.
+
+#[cfg(feature = "compiled")]
+mod kernels;
+#[cfg(feature = "compiled")]
+mod matrices;
 
 use energy_dsl::{BatchError, Flagged, Float, RoutineKind};
 
@@ -6,9 +11,8 @@ use energy_dsl::{BatchError, Flagged, Float, RoutineKind};
 /// each point, or its unknowns.
 pub trait CompiledBatch<S>: Send + Sync {
     /// Writes the results of a routine for all elements, matrices row by row. `v` may be empty if the routine does not
-    /// read it.
-    /// `None` if the routine is not compiled: products of Hessians and
-    /// vectors, and constraints as such with their forces.
+    /// read it. `None` if the routine is not compiled: products of Hessians and vectors, and constraints as such with
+    /// their forces.
     fn evaluate(
         &self,
         routine: RoutineKind,
@@ -21,23 +25,9 @@ pub trait CompiledBatch<S>: Send + Sync {
 /// Binds `count` compiled elements to their numbers: `numbers(i)` returns parameters and stored numbers of element i,
 /// as [`energy_dsl::Stored`] lists them.
 ///
-/// The result is `None` without the feature `batches`, for an unknown name, and for elements whose largest routine has
+/// The result is `None` without the feature `compiled`, for an unknown name, and for elements whose largest routine has
 /// more than 475 operations (100 in `f32`). These take too long to compile, and too much space. It is also `None` if
 /// coordinates cannot be indexed by `u32`.
-///
-/// ```
-/// # #[cfg(feature = "batches")] {
-/// use energy_elements::catalogue::bind;
-/// use energy_dsl::RoutineKind;
-///
-/// // HookeSpring(p, q; k, L): U = k/2 (‖p − q‖ − L)².
-/// let springs = bind::<f64>("HookeSpring", 2, |_| vec![100.0, 1.0]).unwrap();
-/// let x = [0.0, 0.0, 0.0, 2.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0];
-/// let mut energies = [0.0; 2];
-/// springs.evaluate(RoutineKind::Value, &x, &[], &mut [&mut energies]).unwrap().unwrap();
-/// assert_eq!(energies, [50.0, 0.0]);
-/// # }
-/// ```
 #[must_use]
 pub fn bind<S: Scalar>(
     name: &str,
@@ -49,24 +39,22 @@ pub fn bind<S: Scalar>(
 }
 
 /// Binds elements of one type.
-#[doc(hidden)]
 pub type Bind<S> = fn(usize, &dyn Fn(usize) -> Vec<S>) -> Option<Box<dyn CompiledBatch<S>>>;
 
 /// `f32` or `f64`.
 pub trait Scalar: Float + Send + Sync + 'static {
-    /// Names of the elements, and how to bind them. Empty without the feature `batches`.
-    #[doc(hidden)]
+    /// Names of the elements, and how to bind them. Empty without the feature `compiled`.
     fn table() -> &'static [(&'static str, Option<Bind<Self>>)];
 }
 
-#[cfg(not(feature = "batches"))]
+#[cfg(not(feature = "compiled"))]
 impl Scalar for f64 {
     fn table() -> &'static [(&'static str, Option<Bind<Self>>)] {
         &[]
     }
 }
 
-#[cfg(not(feature = "batches"))]
+#[cfg(not(feature = "compiled"))]
 impl Scalar for f32 {
     fn table() -> &'static [(&'static str, Option<Bind<Self>>)] {
         &[]
