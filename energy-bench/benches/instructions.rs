@@ -1,5 +1,5 @@
-//! Instruction counts under Valgrind, for 160 elements: `cargo bench --manifest-path energy-bench/Cargo.toml --bench instructions --features
-//! instructions`.
+//! Instruction counts under Valgrind, for 160 elements: `cargo bench --manifest-path energy-bench/Cargo.toml --bench
+//! instructions --features instructions`.
 //!
 //! It needs Valgrind and the gungraun-runner of gungraun's version. Valgrind does not support AVX-512: AVX2 is the best
 //! level.

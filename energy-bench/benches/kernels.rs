@@ -1,4 +1,5 @@
-//! Criterion's statistics of one run over all elements: `cargo bench --manifest-path energy-bench/Cargo.toml --bench kernels`.
+//! Criterion's statistics of one run over all elements: `cargo bench --manifest-path energy-bench/Cargo.toml --bench
+//! kernels`.
 
 #![allow(missing_docs)]
 

@@ -42,7 +42,7 @@ fn rest_shape(declaration: &Declaration) -> Vec<f64> {
     }
 }
 
-/// Returns places near the rest shape; distinct ones, if there is none.
+/// Returns places near the rest shape; distinct ones without a rest shape.
 fn places(declaration: &Declaration) -> Vec<f64> {
     let points = declaration.points.len();
     let shape = rest_shape(declaration);
@@ -273,7 +273,7 @@ fn residual<E: PackedResidual<f64, Wide<f64> = E>>() -> Vec<Line> {
     lines
 }
 
-/// Returns numbers that lanes of one can be loaded from, also if there are none.
+/// Returns numbers that lanes of one can be loaded from, also without any.
 fn padded(numbers: &[f64]) -> Vec<f64> {
     if numbers.is_empty() { vec![0.0] } else { numbers.to_vec() }
 }

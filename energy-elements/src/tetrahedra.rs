@@ -80,7 +80,7 @@ energy! {
     /// Corotational linear solid on a tetrahedron (McAdams et al. 2011, *Efficient Elasticity for Character Skinning*):
     /// V (μ ‖F − R‖² + λ/2 tr²(S − I)) with the polar decomposition F = R S, det R = 1.
     ///
-    /// Where two signed singular values of F sum to 0, R has no limit: derivatives are taken as 0 and flagged. The rest
+    /// If two signed singular values of F sum to 0, R has no limit: derivatives are taken as 0 and flagged. The rest
     /// shape must have a positive volume.
     #[audit]
     #[invariant(translation, rotation)]

@@ -1,4 +1,4 @@
-//! What it costs to make element Hessians positive semi-definite: assembly of many elements of one type, of which none,
+//! The cost of making element Hessians positive semi-definite: assembly of many elements of one type, of which none,
 //! a tenth or all are indefinite, against assembly without projection.
 //!
 //! `cargo bench -p energy-solve --bench clamping`

@@ -138,7 +138,7 @@ fn a_graph_alone_is_singular_and_needs_damping() {
     let pattern = Arc::new(Couplings::pattern(2, [[0, 1].as_slice()]).unwrap());
     let mut links = ResidualTerm::<Link, 2>::new("links", Arc::new(Couplings::new(&pattern, &[[0, 1]]).unwrap()), 1.0);
     links.set_elements([Placed { element: Link::new(1.0), stencil: 0, weight: 1.0 }]);
-    // Three rows for four unknowns: there is no factor without damping, so the iteration must increase it.
+    // Three rows for four unknowns: a factor needs damping, so the iteration must increase it.
     let options = GaussNewtonOptions { damping: 0.0, ..GaussNewtonOptions::default() };
     let mut solver = GaussNewton::new(pattern, options).unwrap();
     let mut x = [[0.0, 0.0], [2.0, 0.5]];

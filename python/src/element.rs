@@ -63,7 +63,7 @@ pub struct Element {
     last_call: Arc<Mutex<Option<BoundCall>>>,
 }
 
-/// Where an element comes from. Pickles hold this.
+/// The origin of an element. Pickles hold this.
 #[derive(Clone)]
 pub enum Origin {
     /// The library, which has compiled code for it.

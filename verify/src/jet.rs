@@ -8,7 +8,7 @@ use energy_dsl::{Level, Number};
 /// zero.
 #[derive(Clone, Debug)]
 pub struct Jet<T> {
-    /// The value.
+    /// The value, the term of order 0.
     pub value: T,
     first: Vec<Option<T>>,
     /// Upper triangle of second derivatives, row by row; empty if not requested.

@@ -195,8 +195,8 @@ impl<'a> Sampler<'a> {
         Sample { parameters, rest, positions, velocities }
     }
 
-    /// Draws an input whose points are the rest shape, deformed by principal stretches in a range; `None` if there is
-    /// no rest shape with one point for each point.
+    /// Draws an input whose points are the rest shape, deformed by principal stretches in a range; `None` unless the
+    /// rest shape has one point for each point.
     pub fn strained_sample(&mut self, stretches: (f64, f64)) -> Option<Sample> {
         let Declaration { rest, points, .. } = self.declaration;
         let has_shape = has_points(self.declaration) && has_rest_points(self.declaration) && rest.len() == points.len();

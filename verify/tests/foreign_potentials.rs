@@ -1,8 +1,8 @@
 //! Potentials that other tools and papers print: random inputs are right to 2e-13, and results at singular inputs are
 //! their limits, or flagged where there is none. Limits are judged by rays in multi-precision.
 //!
-//! `POTENTIAL_INPUTS=20,8 cargo test --release -p verify --test all foreign_potentials:: -- --nocapture` takes 20 random
-//! and 8 singular inputs for each, and prints the time at singular inputs. `POTENTIAL_SEED` chooses others.
+//! `POTENTIAL_INPUTS=20,8 cargo test --release -p verify --test all foreign_potentials:: -- --nocapture` takes 20
+//! random and 8 singular inputs for each, and prints the time at singular inputs. `POTENTIAL_SEED` chooses others.
 
 use std::time::Instant;
 
@@ -21,8 +21,8 @@ const RAYS: usize = 10;
 const DIGITS: usize = 60;
 /// Largest error at random inputs, relative to the largest number of a block.
 const ACCURACY: f64 = 2e-13;
-/// Potentials that lose digits: 1 − e⁻ˣ Σ xᵏ/k! cancels for small x, and singular vectors turn fast where stretches nearly
-/// meet.
+/// Potentials that lose digits: 1 − e⁻ˣ Σ xᵏ/k! cancels for small x, and singular vectors turn fast where stretches
+/// nearly meet.
 const CANCELLING: [(&str, f64); 2] = [("TangToennies", 1e-6), ("Ogden", 1e-10)];
 const ROUTINES: [&str; 3] = ["value", "gradient", "hessian"];
 
@@ -150,7 +150,7 @@ fn random_inputs_are_right_to_2e_13() {
     assert!(inputs >= 30);
 }
 
-/// What was seen at singular inputs.
+/// Findings at singular inputs.
 #[derive(Default)]
 struct Seen {
     limits: usize,

@@ -339,7 +339,7 @@ fn errors_in_single_precision_are_within_the_condition() {
     all_within::<f32>(2.0_f64.powi(-24), 3.0, 7.0, 60);
 }
 
-/// Of 10⁵ matrices, the one whose rotation takes the most steps: κ = 1.6e13, nearly a mirror image.
+/// The matrix of 10⁵ whose rotation takes the most steps: κ = 1.6e13, nearly a mirror image.
 #[test]
 fn the_slowest_refinement_converges() {
     let entries = [

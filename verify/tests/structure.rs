@@ -1,6 +1,6 @@
 //! The structure of the workspace: no import cycle between the top-level modules of a crate, no dependency cycle
-//! between crates, no path in `ARCHITECTURE.md` that does not exist, no arrow between crates that its picture lacks, and
-//! no file of tests that nothing runs.
+//! between crates, no path in `ARCHITECTURE.md` that does not exist, no arrow between crates that its picture lacks,
+//! and no file of tests that nothing runs.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};

@@ -178,8 +178,9 @@ impl Run {
         Self { simulation: self.simulation.with_threads(threads), threads, ..self }
     }
 
-    /// Resumes from the last checkpoint in a folder, or from the one before it if the last one is damaged. Frames that are missing or truncated are written again. With
-    /// `accept_edited`, continues with meshes and materials that were edited since the run began.
+    /// Resumes from the last checkpoint in a folder, or from the one before it if the last one is damaged. Frames that
+    /// are missing or truncated are written again. With `accept_edited`, continues with meshes and materials that were
+    /// edited since the run began.
     ///
     /// # Errors
     /// Returns an error if the checkpoint is missing, damaged, of another version, or does not fit the scene, or if

@@ -254,7 +254,7 @@ impl Budget {
         }
     }
 
-    /// Returns the binding with the most operations, and their number; `None` if there are no bindings.
+    /// Returns the binding with the most operations, and their number; `None` without bindings.
     pub(crate) fn largest(&self) -> Option<(usize, usize)> {
         let [largest, most] = self.0.largest.each_ref().map(|number| number.load(Ordering::Relaxed));
         (most > 0).then_some((largest, most))
@@ -309,7 +309,8 @@ impl Budget {
 
     /// Runs a part of the compiler. Returns the reason if it was stopped.
     pub(crate) fn within<T>(&self, part: impl FnOnce() -> T) -> Result<T, Stop> {
-        // What the part has changed is dropped with it, apart from diagnostics, which are complete after each push.
+        // Changes that the part has made are dropped with it, apart from diagnostics, which are complete after each
+        // push.
         catch_unwind(AssertUnwindSafe(part)).map_err(|reason| match reason.downcast::<Stop>() {
             Ok(stop) => *stop,
             Err(panic) => resume_unwind(panic),

@@ -194,7 +194,7 @@ impl Diagnostics {
         part.0.into_iter().for_each(|diagnostic| self.push(diagnostic));
     }
 
-    /// Returns `value` if there are no errors.
+    /// Returns `value` without errors.
     ///
     /// # Errors
     /// Whatever was noted.

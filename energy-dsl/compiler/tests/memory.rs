@@ -1,4 +1,4 @@
-//! Texts that are compiled at run time leave no memory behind. The test has a program of its own, so that its memory is
+//! Texts that are compiled at run time leave no memory behind. The test has its own program, so that its memory is
 //! that of the texts.
 #![allow(missing_docs)]
 

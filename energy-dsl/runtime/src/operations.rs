@@ -4,7 +4,7 @@
 /// level `L`. Rows that return numbers also name the fields of [`OperationCount`](crate::OperationCount) that they add
 /// to. The compiler's operations, the code that it writes, and the instructions of tapes are made from these rows.
 ///
-/// Not in the table are constants, inputs, the test of a moderate size, and the selection by a mask: their operands are
+/// The table lacks constants, inputs, the test of a moderate size, and the selection by a mask: their operands are
 /// of other kinds.
 #[doc(hidden)]
 #[macro_export]
@@ -70,7 +70,8 @@ macro_rules! with_operations {
                     /// The power of two that scales |a| into [1, 2).
                     PowerOfTwoScale(a) = a.power_of_two_scale(), [basic];
                 }
-                // Pairs and triples of the above, of which only the last result is read. They save loads and stores of tapes.
+                // Pairs and triples of the above, of which only the last result is read. They save loads and stores of
+                // tapes.
                 joint {
                     /// a · b + c · d, the second product fused.
                     MulThenMulAdd(a, b, c, d) = c.mul_add::<L>(d, a * b);

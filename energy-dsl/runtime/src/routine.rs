@@ -30,7 +30,7 @@ pub enum RoutineKind {
 }
 
 impl RoutineKind {
-    /// All kinds.
+    /// All kinds of routines.
     pub const ALL: [Self; 13] = [
         Self::Rest,
         Self::Value,

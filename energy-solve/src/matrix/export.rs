@@ -27,7 +27,7 @@ pub struct Csr<T = f64> {
     pub offsets: Vec<usize>,
     /// Column of each entry.
     pub columns: Vec<usize>,
-    /// Each entry.
+    /// Value of each entry, next to its column.
     pub values: Vec<T>,
 }
 

@@ -18,7 +18,7 @@ use crate::terms::term::{Character, MadeFromTerm, PlacedTerm, Quantity, Term, Te
 /// The results that an [`OwnLaw`] is asked for. Each includes those before it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Order {
-    /// Energies.
+    /// Energies of the elements.
     Energy,
     /// Energies and forces.
     Force,

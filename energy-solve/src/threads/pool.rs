@@ -12,8 +12,8 @@ const STACK: usize = 16 << 20;
 /// wake a thread.
 const PATIENCE: Duration = Duration::from_micros(200);
 
-/// The threads, one per core, if work is for more than one. To wake one takes a tenth of the time that it takes to start
-/// one. `None` also if the system refuses to start them, or in a forked process, which inherits no threads.
+/// The threads, one per core, if work is for more than one. To wake one takes a tenth of the time that it takes to
+/// start one. `None` also if the system refuses to start them, or in a forked process, which inherits no threads.
 pub(super) fn pool(threads: usize) -> Option<&'static ThreadPool> {
     static POOL: OnceLock<(u32, Option<ThreadPool>)> = OnceLock::new();
     if threads <= 1 {

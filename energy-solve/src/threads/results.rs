@@ -1,7 +1,7 @@
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// Results of several threads, with the numbers of what they belong to.
+/// Results of several threads, with the numbers of their items.
 pub(super) struct Results<R> {
     list: Mutex<Vec<(usize, R)>>,
     /// The number of results, for threads that wait: if they took the lock to look, they would delay the others.

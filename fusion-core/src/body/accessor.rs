@@ -204,7 +204,8 @@ impl<'a> Accessors<'a> {
     }
 }
 
-/// Compares the smallest and the largest values with those that the accessor states: bytes at a wrong place have others.
+/// Compares the smallest and the largest values with those that the accessor states: bytes at a wrong place have
+/// others.
 fn check_bounds<const N: usize>(accessor: &Accessor, values: &[[f64; N]]) -> Result<(), String> {
     let stated = |bound: &Option<serde_json::Value>| -> Option<[f64; N]> {
         let list: Vec<f64> = bound.as_ref()?.as_array()?.iter().filter_map(serde_json::Value::as_f64).collect();

@@ -121,7 +121,7 @@ impl OwnForce for OwnText {
 }
 
 energy! {
-    // What reports say about the terms of functions.
+    // Texts of reports about the terms of functions.
 
     /// An energy that a function of Python evaluates.
     energy PythonEnergy(p: Point) { norm_squared(p) }

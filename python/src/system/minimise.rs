@@ -17,7 +17,7 @@ pub struct Minimised {
     pub converged: bool,
 }
 
-/// What to minimise, and how well.
+/// The problem, and the accuracy to reach.
 pub struct Goal<'a> {
     /// The factor of ½ Σ mᵢ ‖xᵢ − tᵢ‖².
     pub mass: f64,
@@ -80,7 +80,7 @@ pub fn minimise(assembly: &mut Assembly, mut x: Vec<Vector3<f64>>, goal: &Goal<'
     }
 }
 
-/// The gradient at the free vertices, and Newton's step; `None` if there is none.
+/// The gradient at the free vertices, and Newton's step; `None` without one.
 type GradientAndStep = (Vec<Vector3<f64>>, Option<Vec<Vector3<f64>>>);
 
 /// Returns the gradient at the free vertices, and the step −H⁻¹ g; `None` if no shift of H helps.

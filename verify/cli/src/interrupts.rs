@@ -76,8 +76,8 @@ impl Interrupts {
     }
 }
 
-/// Turns a file that exceeds the limit of the process (`ulimit -f`) from a signal that ends the program into an error of
-/// the write, which names the file.
+/// Turns a file that exceeds the limit of the process (`ulimit -f`) from a signal that ends the program into an error
+/// of the write, which names the file.
 ///
 /// # Errors
 /// If the operating system does not let the program listen.

@@ -10,7 +10,7 @@ const LARGEST_TEXT: u64 = 16 << 20;
 /// Compiles an element of the catalogue, or the declarations of an `.energy` file, for printing.
 ///
 /// # Errors
-/// If there is no such element or file, or the file has errors.
+/// If the element or the file does not exist, or the file has errors.
 pub fn listings(name: &str) -> anyhow::Result<Vec<Listing>> {
     if Path::new(name).extension().is_some_and(|extension| extension == "energy") {
         let text =

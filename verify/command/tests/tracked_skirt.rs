@@ -17,8 +17,8 @@ const DOWN: usize = 24;
 const STEPS: u64 = 3;
 const FRAMES: u64 = 20;
 
-/// Returns an A-line with its waist at a height of 0.5 m, as OBJ text. Wider skirts fall into deep folds, because there
-/// are no legs below.
+/// Returns an A-line with its waist at a height of 0.5 m, as OBJ text. Wider skirts fall into deep folds, because no
+/// legs are below.
 fn skirt() -> String {
     let mut text = String::new();
     for ring in 0..=DOWN {

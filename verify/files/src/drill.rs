@@ -74,7 +74,7 @@ impl Drill<'_> {
         count
     }
 
-    /// Kills the program at random times, also while it continues, until there were so many kills. Returns the number
+    /// Kills the program at random times, also while it continues, until that many kills were made. Returns the number
     /// of works that were completed.
     ///
     /// # Panics

@@ -45,7 +45,7 @@ fn struck() -> Option<Fault> {
 fn strike<T>(fault: Fault) -> Result<T> {
     eprintln!("fault at operation {}", PLANNED.map_or(0, |(_, at)| at));
     match fault {
-        // As a kill does: no destructor runs.
+        // Like a kill: no destructor runs.
         Fault::Kill => std::process::exit(137),
         Fault::Fail | Fault::Full => Err(ErrorKind::StorageFull.into()),
     }

@@ -22,7 +22,7 @@ pub enum LockError {
     File {
         /// Path of the file.
         path: PathBuf,
-        /// The reason.
+        /// The operating system's reason.
         source: std::io::Error,
     },
 }

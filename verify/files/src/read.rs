@@ -19,7 +19,7 @@ pub fn open(path: &Path, limit: u64) -> Result<File> {
 /// Reads a regular file of at most `limit` bytes.
 ///
 /// # Errors
-/// As [`open`], and if the file cannot be read.
+/// Those of [`open`], and if the file cannot be read.
 ///
 /// ```
 /// # let folder = tempfile::tempdir()?;
@@ -37,21 +37,21 @@ pub fn read(path: &Path, limit: u64) -> Result<Vec<u8>> {
 /// Reads a regular file of at most `limit` bytes, which must be UTF-8.
 ///
 /// # Errors
-/// As [`read`], and if the file is not UTF-8; then the message names the line.
+/// Those of [`read`], and if the file is not UTF-8; then the message names the line.
 pub fn read_text(path: &Path, limit: u64) -> Result<String> {
     utf8(read(path, limit)?)
 }
 
-/// Reads a file that a program has written into a folder of its own. Unlike [`read`], follows no symbolic link: the
+/// Reads a file that a program has written into its own folder. Unlike [`read`], follows no symbolic link: the
 /// folder may be a stranger's.
 ///
 /// # Errors
-/// As [`read`], and if the path is a symbolic link.
+/// Those of [`read`], and if the path is a symbolic link.
 pub fn read_state(path: &Path, limit: u64) -> Result<Vec<u8>> {
     contents(open_state(path, limit, OpenOptions::new().read(true))?, limit)
 }
 
-/// Opens a file that a program has written into a folder of its own, as [`read_state`] does. The options must not
+/// Opens a file that a program has written into its own folder, as [`read_state`] does. The options must not
 /// create or truncate it.
 ///
 /// # Errors

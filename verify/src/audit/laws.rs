@@ -57,7 +57,7 @@ impl Auditor<'_> {
         }
     }
 
-    /// Checks that a value where the formula has none is flagged.
+    /// Checks that a value where the formula is undefined is flagged.
     pub(super) fn outside(&mut self, sample: &Sample) {
         let Ok(answer) = self.answer(sample) else { return };
         let Some(block) = answer.blocks.first() else { return };

@@ -127,7 +127,7 @@ impl Auditor<'_> {
         }
     }
 
-    /// Returns the limit of each block; `None` if there is none. It is what the formula tends to along random
+    /// Returns the limit of each block; `None` without a limit. It is the limit of the formula along random
     /// directions, in multi-precision.
     fn limits(&self, extreme: &Extreme) -> Vec<Option<TrueBlock>> {
         const DISTANCE: f64 = 1.0 / (1_u128 << 100) as f64;

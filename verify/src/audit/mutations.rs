@@ -169,7 +169,7 @@ fn rare_branches<'a>(
         let mut auditor = Auditor::new(subject);
         let sound = look(&mut auditor, &case).is_ok();
         let fails_anyway = failed(&auditor);
-        // If the code under audit flags its result, or has none, there is nothing to compare.
+        // If the code under audit flags its result, or returns none, nothing can be compared.
         if sound && !fails_anyway.contains(&Check::Finite) && !fails_anyway.contains(&Check::Accuracy) {
             seen.extend(taken.into_iter().enumerate());
             found.push(Trial { case, fails_anyway });

@@ -15,9 +15,9 @@ pub enum Check {
     DualNumbers,
     /// Finite differences of the block one order below agree.
     FiniteDifferences,
-    /// Most inputs have differences that stay on one side of every kink; the error is the part that has none.
+    /// Most inputs have differences that stay on one side of every kink; the error is the part that lacks them.
     OneSide,
-    /// Where branches of the formula meet, the values of both sides are equal.
+    /// The values of both sides are equal where branches of the formula meet.
     Continuity,
     /// All routines that return the block agree.
     Routines,
@@ -42,7 +42,7 @@ pub enum Check {
     /// No number is NaN or infinite, and no flag is set, at an ordinary input. Near rest and near singularities, each
     /// number is finite or flagged, or infinite because the true one is too large.
     Finite,
-    /// Where the formula has no value, the result is flagged.
+    /// The result is flagged where the formula has no value.
     Outside,
 }
 
@@ -254,7 +254,7 @@ pub struct Warning {
     pub subexpression: Option<String>,
     /// A spelling that keeps the digits, or where to look for one.
     pub proposal: String,
-    /// The input.
+    /// The input that shows it.
     pub input: Sample,
 }
 

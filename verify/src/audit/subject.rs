@@ -120,7 +120,7 @@ impl Target {
 
 /// An element under audit.
 pub struct Subject {
-    /// The declaration.
+    /// The declaration of the element.
     pub declaration: Cow<'static, Declaration>,
     /// Evaluates all blocks of the element.
     pub evaluate: EvaluateAny,

@@ -218,7 +218,7 @@ impl<'a> Checker<'a> {
         }
     }
 
-    // Checking recurses over expressions: what is rarely needed has a frame of its own.
+    // Checking recurses over expressions: rare cases have their own frame.
     #[inline(never)]
     fn conditional(&mut self, [yes, no]: [&'a Body; 2], condition: &'a Expression, span: &Span) -> Option<Typed> {
         let checked = self.expression(condition);

@@ -8,7 +8,7 @@ use crate::syntax::{Body, Declaration, Expression, ExpressionKind, Item, Name, U
 
 /// Names that the language treats as functions although they are not in its table.
 const FORMS: [&str; 3] = ["gradient", "identity", "sum"];
-/// Names of numbers, with what they name.
+/// Names of numbers, with their numbers.
 const NUMBERS: [(&str, &str); 4] =
     [("π", "the number π"), ("pi", "the number π"), ("PI", "the number π"), ("infinity", "an infinite value")];
 

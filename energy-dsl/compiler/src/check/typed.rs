@@ -33,7 +33,7 @@ pub struct Program {
     pub moving: Vec<Input>,
     /// Inputs of the rest shape.
     pub rest: Vec<Input>,
-    /// Parameters. Those of a constraint end with stiffness and damping.
+    /// Parameters, in the order of the declaration. Those of a constraint end with stiffness and damping.
     pub parameters: Vec<Input>,
     /// Whether the body reads velocities.
     pub has_velocities: bool,
@@ -41,7 +41,7 @@ pub struct Program {
     pub bindings: Vec<Binding>,
     /// Result of the body.
     pub result: Typed,
-    /// Limits of its own; `None` for those of the text.
+    /// Its own limits; `None` for those of the text.
     pub limits: Option<Limits>,
     /// Pays for compiling it.
     pub budget: Budget,
@@ -64,7 +64,7 @@ impl Program {
         }
     }
 
-    /// Returns the same declaration with the value 0, and a budget of its own. Code that uses a declaration which was
+    /// Returns the same declaration with the value 0, and its own budget. Code that uses a declaration which was
     /// stopped then causes no further errors.
     #[must_use]
     pub(crate) fn stub(&self) -> Self {
@@ -117,7 +117,7 @@ pub struct Input {
     pub input_type: InputType,
     /// Unit as written.
     pub unit: String,
-    /// Place of the unit, or of the name if there is no unit.
+    /// Place of the unit, or of the name without a unit.
     pub span: Span,
     /// Index of the first component within its section.
     pub first: usize,

@@ -53,7 +53,7 @@ impl<'a> Vanishing<'a> {
         }
     }
 
-    /// Returns whether two expressions are written alike. Names of the same value are alike.
+    /// Returns whether two expressions have the same text. Names of the same value count as equal.
     fn are_same(&self, a: &Typed, b: &Typed) -> bool {
         let (a, b) = (self.named(a), self.named(b));
         let same = match (&a.kind, &b.kind) {

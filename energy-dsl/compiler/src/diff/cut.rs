@@ -1,6 +1,6 @@
 //! Second derivatives gathered at a cut. If everything that moves enters U through a few numbers c, then ∇²U = Σ ∂U/∂c
-//! ∇²c + Σ (Σ ∂²U/∂c∂c′ ∇c′) ∇cᵀ. There are few derivatives with respect to c, and each ∇c appears in one outer product.
-//! The numbers are robust primitives, or the nodes of a narrow part of the graph.
+//! ∇²c + Σ (Σ ∂²U/∂c∂c′ ∇c′) ∇cᵀ. There are few derivatives with respect to c, and each ∇c appears in one outer
+//! product. The numbers are robust primitives, or the nodes of a narrow part of the graph.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -209,8 +209,8 @@ const MOST_WAISTS: usize = 5;
 const MOST_PRODUCTS: usize = 1_000_000;
 
 /// Returns the narrow parts of the graph between the coordinates and U: fronts that are narrower than all that are
-/// closer to the coordinates, and linear functions of the coordinates. Of many, it returns those of few nodes and the one
-/// that is closest to the coordinates.
+/// closer to the coordinates, and linear functions of the coordinates. Of many, it returns those of few nodes and the
+/// one that is closest to the coordinates.
 pub(super) fn waists(g: &Graph, output: NodeId, coordinates: &Coordinates) -> Vec<Vec<NodeId>> {
     let widest = (MOST_PRODUCTS / coordinates.len().pow(2).max(1)).min(coordinates.len().saturating_sub(1));
     let mut fronts = Fronts::new(g, output, coordinates);

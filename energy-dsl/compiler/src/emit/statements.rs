@@ -59,7 +59,7 @@ impl Rendered {
         group.iter().map(|&place| self.names.of(place).clone()).collect()
     }
 
-    /// Returns a mask; false if there is none.
+    /// Returns a mask; false without one.
     pub(super) fn mask(&self, place: Option<NodeId>) -> TokenStream {
         match place {
             Some(place) => self.names.of(place).clone(),

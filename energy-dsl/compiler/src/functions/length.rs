@@ -203,7 +203,7 @@ fn unit_parts(g: &mut Graph, d: &[NodeId]) -> Vec<NodeId> {
 
 /// Recognises ‖d‖^α, where α is a parameter or a constant. With g = α ‖d‖^(α−1), the gradient is g n and the Hessian
 /// (g/r) (I + (α − 2) n nᵀ). An even constant power is a polynomial of d·d. At d = 0 both are their limits, or 0 and
-/// flagged if there is none.
+/// flagged without a limit.
 pub(super) fn recognise_norm_power(g: &mut Graph, base: NodeId, exponent: NodeId) -> Option<NodeId> {
     let rule = g.rule(base)?;
     let (d, length) = (rule.vector.clone()?, rule.value);

@@ -52,9 +52,9 @@ impl Interval {
     }
 }
 
-/// Returns a power series as a polynomial of low degree (Lanczos' economisation). The term of highest degree is replaced
-/// by lower ones, using x² times the Chebyshev polynomial with the same leading coefficient, while this changes the sum
-/// by at most 2⁻⁵⁶ of its first term. The first two terms stay: rounding them again would cost more.
+/// Returns a power series as a polynomial of low degree (Lanczos' economisation). The term of highest degree is
+/// replaced by lower ones, using x² times the Chebyshev polynomial with the same leading coefficient, while this
+/// changes the sum by at most 2⁻⁵⁶ of its first term. The first two terms stay: rounding them again would cost more.
 pub(super) fn economised(coefficient: impl Fn(u32) -> f64, interval: Interval) -> Vec<f64> {
     let (end, budget) = (interval.end(), coefficient(0).abs() * 2.0_f64.powi(-56));
     let negligible = |k: u32| coefficient(k).abs() * end.powi(k as i32) < budget * 2.0_f64.powi(-10);

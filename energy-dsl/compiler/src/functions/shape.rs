@@ -5,7 +5,7 @@ use crate::graph::NodeId;
 /// The shape of a value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Shape {
-    /// One number.
+    /// A single number, without components.
     Scalar,
     /// A vector of 2, 3 or 4 numbers.
     Vector(u8),

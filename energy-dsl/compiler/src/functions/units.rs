@@ -19,7 +19,7 @@ pub enum Units {
     PowerOfSize(i8),
     /// Returns the product of both arguments' units, part by part if one of them has two.
     Scaled,
-    /// As `Scaled`; the product of two dual quaternions is p q + ε (p q′ + p′ q).
+    /// Like `Scaled`; the product of two dual quaternions is p q + ε (p q′ + p′ q).
     Product,
     /// Returns the quotient of both arguments' units.
     Quotient,

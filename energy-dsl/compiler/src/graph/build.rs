@@ -239,7 +239,7 @@ impl Graph {
         }
     }
 
-    /// Splits a leading power of two off a product; returns 1 and the node if there is none.
+    /// Splits a leading power of two off a product; returns 1 and the node without one.
     fn power_of_two_times(&self, node: NodeId) -> (f64, NodeId) {
         let scaled = self.scaled_by_constant(node);
         let scaled = scaled.and_then(|(c, x)| Some((self.as_constant(c).filter(|&c| is_power_of_two(c))?, x)));

@@ -2,12 +2,13 @@
 
 use super::{Graph, NodeId};
 
-/// Primitives of the same arguments, such as the entries of R(F), and Σ wᵢ ∇²vᵢ in fewer operations than each ∇²vᵢ takes.
+/// Primitives of the same arguments, such as the entries of R(F), and Σ wᵢ ∇²vᵢ in fewer operations than each ∇²vᵢ
+/// takes.
 #[derive(Clone, Debug)]
 pub(crate) struct Contraction {
     /// vᵢ, as rules.
     pub(crate) values: Vec<NodeId>,
-    /// Their arguments.
+    /// The arguments that they share.
     pub(crate) arguments: Vec<NodeId>,
     /// Numbers that `second` reads.
     pub(crate) factors: Vec<NodeId>,

@@ -120,7 +120,7 @@ impl Graph {
         }
     }
 
-    /// Sets the budget that pays for nodes. Otherwise there are no limits.
+    /// Sets the budget that pays for nodes. Otherwise nothing is limited.
     #[must_use]
     pub fn paid_by(self, budget: &Budget) -> Self {
         Self { budget: budget.clone(), ..self }

@@ -6,7 +6,7 @@ pub use energy_runtime::tape::Input;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct NodeId(pub(crate) u32);
 
-/// What a row of the table of operations says, for those who write code.
+/// A row of the table of operations, for those who write code.
 #[derive(Clone, Copy, Debug)]
 pub struct Spelling {
     /// The meaning as Rust, over a number type at a SIMD level `L`.
@@ -18,9 +18,9 @@ pub struct Spelling {
 /// The result of an operation over a number type.
 #[derive(Clone)]
 pub enum Computed<T: Number> {
-    /// A number.
+    /// A floating-point number.
     Number(T),
-    /// A mask.
+    /// The result of a comparison, a mask.
     Mask(T::Mask),
 }
 
@@ -148,7 +148,7 @@ macro_rules! define {
                 })
             }
 
-            /// Returns how the table spells the operation; `None` for what is not in the table.
+            /// Returns how the table spells the operation; `None` for operations outside the table.
             pub(crate) fn spelling(self) -> Option<Spelling> {
                 let (meaning, operands): (_, &[&str]) = match self {
                     $(Self::$number(..) => (stringify!($meaning), &[$(stringify!($operand)),*]),)*

@@ -46,7 +46,7 @@ pub fn general(g: &mut Graph, outputs: &[NodeId]) -> Vec<NodeId> {
     outputs.iter().map(|&output| path.rebuild(g, output)).collect()
 }
 
-/// Returns `outputs` under all assumptions, and the mask where these hold; `None` if there are no precautions.
+/// Returns `outputs` under all assumptions, and the mask where these hold; `None` without precautions.
 pub fn ordinary(g: &mut Graph, outputs: &[NodeId]) -> Option<(Vec<NodeId>, NodeId)> {
     let mut path = Path { assumptions: g.assumptions.iter().map(|a| (a.node, *a)).collect(), ..Path::default() };
     let (cautious, never) = (g.cautious(), g.truth(false));

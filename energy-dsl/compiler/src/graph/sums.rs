@@ -74,7 +74,7 @@ impl Graph {
         let node = self.fused_product_difference(None, plus, minus);
         let (unsigned, negative) = self.magnitude(node);
         let (plus, minus) = if negative { (minus, plus) } else { (plus, minus) };
-        // A difference that folds to one of its own factors, such as 0, cannot be weighed through its factors.
+        // A difference that folds to one of its factors, such as 0, cannot be weighed through its factors.
         if plus.iter().chain(minus).all(|&factor| self.magnitude(factor).0 < unsigned) {
             self.weighable.entry(unsigned).or_insert_with(|| [plus.to_vec(), minus.to_vec()]);
         }

@@ -72,7 +72,7 @@ impl Listing {
             let mut routines = differentiate(program, lower(program));
             let code = emit(program, &Plan::new(program, &routines));
             let spent = [before, program.budget.progress()];
-            // What is counted later is not part of the compilation.
+            // Later counts are not part of the compilation.
             routines.graph = routines.graph.paid_by(&Budget::new(Limits::NONE));
             Self { name: program.name.clone(), code, routines, spent }
         };

@@ -186,7 +186,7 @@ pub fn programs(source: &str, budget: &Budget) -> Result<Vec<Program>, Diagnosti
     diagnostics.finish(programs)
 }
 
-/// Describes why a text is not tokens of Rust: by the characters that are no tokens, or else by its strings.
+/// Describes why a text is not tokens of Rust: by the characters that cannot be tokens, or else by its strings.
 fn not_tokens(source: &str) -> Diagnostics {
     let mut diagnostics = Diagnostics::default();
     let here = Span::of(proc_macro2::Span::call_site());

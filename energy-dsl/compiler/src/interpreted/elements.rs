@@ -24,9 +24,9 @@ pub struct Elements<S = f64> {
 pub enum EvaluateError {
     /// Declarations of this kind do not have the routine.
     Routine {
-        /// The declaration.
+        /// Name of the declaration.
         declaration: Arc<Declaration>,
-        /// The routine.
+        /// Name of the routine.
         routine: &'static str,
     },
     /// Range and slices do not fit each other.

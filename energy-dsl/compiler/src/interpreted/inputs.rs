@@ -18,7 +18,7 @@ pub enum InputKind {
     Unknown,
     /// Part of the rest shape, read once when an element is made.
     Rest,
-    /// A parameter.
+    /// A parameter of the declaration.
     Parameter,
 }
 
@@ -64,7 +64,7 @@ impl InputNumbers {
 pub enum BindError {
     /// More or fewer columns than inputs.
     Columns {
-        /// The element.
+        /// Index of the element, from 0.
         element: String,
         /// Whether the columns are those of the rest shape; else of parameters.
         rest: bool,
@@ -75,7 +75,7 @@ pub enum BindError {
     },
     /// A column of another length than its input needs.
     Length {
-        /// The element.
+        /// Index of the element, from 0.
         element: String,
         /// Name of the input.
         input: String,
@@ -88,7 +88,7 @@ pub enum BindError {
     Rest {
         /// Index of the first element that has one.
         index: usize,
-        /// The error.
+        /// The error of its rest shape.
         error: RestError,
     },
 }

@@ -127,7 +127,7 @@ impl Formula {
 /// A program in its textbook form, without derivatives.
 #[derive(Clone, Debug)]
 pub struct TextbookFormula {
-    /// The formula. The derivatives that it uses are [`Input::Precomputed`].
+    /// The formula, as a graph. The derivatives that it uses are [`Input::Precomputed`].
     pub formula: Formula,
     /// Derivatives that the formula uses: node, section and index of the input number. Later ones may use earlier ones.
     pub gradients: Vec<(NodeId, Source, usize)>,

@@ -5,7 +5,7 @@ use energy_runtime::RoutineKind;
 /// How the numbers of a group are arranged.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Shape {
-    /// One number.
+    /// A single number, without components.
     Number,
     /// A list of numbers.
     Numbers,

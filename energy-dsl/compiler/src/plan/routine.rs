@@ -11,7 +11,7 @@ pub(crate) struct RoutinePlan {
     pub(crate) ordinary: Code,
     /// Whether a fault was planted in the ordinary path. The guard then does not share its statements.
     pub(crate) is_broken: bool,
-    /// The path for inputs that the ordinary path does not suffice for; `None` if there are no precautions.
+    /// The path for inputs that the ordinary path does not suffice for; `None` without precautions.
     pub(crate) general: Option<GeneralPlan>,
 }
 

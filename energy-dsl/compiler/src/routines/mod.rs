@@ -28,7 +28,7 @@ pub struct Routine {
     pub groups: Vec<Vec<NodeId>>,
     /// Masks of the flags of the ordinary path: degenerate, kink.
     pub flags: [Option<NodeId>; 2],
-    /// The general path; `None` if there are no precautions.
+    /// The general path; `None` without precautions.
     pub general: Option<General>,
 }
 
@@ -190,7 +190,7 @@ impl Routines {
 /// − 1 are the gradient, the triangle follows.
 #[derive(Clone, Debug)]
 pub struct Expansion {
-    /// The graph.
+    /// The graph of all routines.
     pub graph: Graph,
     /// The gradient ∇U.
     pub gradient: Vec<NodeId>,
@@ -199,8 +199,9 @@ pub struct Expansion {
 }
 
 impl Expansion {
-    /// Creates the expansion. Derivatives that are constant or equal in the reduced gradient are so here. Entries of the
-    /// reduced Hessian are not, unless all are 0: a projection to a semi-definite matrix may change them in between.
+    /// Creates the expansion. Derivatives that are constant or equal in the reduced gradient are so here. Entries of
+    /// the reduced Hessian are not, unless all are 0: a projection to a semi-definite matrix may change them in
+    /// between.
     fn new(g: &Graph, energy: &SecondOrder, coordinates: &Coordinates, points: usize) -> Self {
         let mut graph = Graph::textbook().paid_by(g.budget());
         let all: Vec<NodeId> = energy.gradient.iter().chain(&energy.hessian).map(|&node| g.resolve(node)).collect();

@@ -1,8 +1,8 @@
 //! Finds results that may overflow although the values of a routine do not.
 //!
-//! Guards bound lengths, and other operands with their reciprocals. From these, bounds on the exponents of all operations
-//! follow, if one more guard keeps parameters and other lengths far from overflow. Results within the range of the type
-//! are then finite. The others are tested when they are known.
+//! Guards bound lengths, and other operands with their reciprocals. From these, bounds on the exponents of all
+//! operations follow, if one more guard keeps parameters and other lengths far from overflow. Results within the range
+//! of the type are then finite. The others are tested when they are known.
 //!
 //! Primitives divide lengths by lengths: a direction d/‖d‖ has size 1, a curvature ∂n/∂x has that of 1/‖d‖. So lengths
 //! count by their degree, as if those of one element were of one size, and their powers cancel. Powers of lengths that
@@ -194,7 +194,7 @@ impl Size {
     }
 }
 
-/// What a number without a guard is.
+/// The range of a number without a guard.
 #[derive(Clone, Copy)]
 enum Unbounded {
     Parameter,

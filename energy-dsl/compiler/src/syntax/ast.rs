@@ -17,7 +17,7 @@ pub enum Item {
     Specialisation(Box<Specialisation>),
 }
 
-/// Where and how strictly `#[audit(domain(…), tolerance = …)]` wants a declaration audited.
+/// The domain and the tolerance of `#[audit(domain(…), tolerance = …)]`.
 #[derive(Clone, Debug, Default)]
 pub struct AuditScope {
     /// Ranges to draw inputs from.
@@ -108,7 +108,7 @@ pub enum ElementType {
     Point,
     /// The velocity of the point with the same number.
     Velocity,
-    /// One number.
+    /// A single number, without components.
     Scalar,
     /// A vector of 2, 3 or 4 numbers.
     Vector(u8),
@@ -180,14 +180,14 @@ pub struct InputGroup {
     pub length: Option<Expression>,
     /// Place of the type.
     pub type_span: Span,
-    /// Unit as written; empty if there is none.
+    /// Unit as written; empty without one.
     pub unit: Unit,
 }
 
 /// A unit, as written.
 #[derive(Clone, Debug, Default)]
 pub struct Unit {
-    /// Text of the unit; empty if there is none.
+    /// Text of the unit; empty without one.
     pub text: String,
     /// Place of the unit.
     pub span: Option<Span>,
@@ -251,7 +251,7 @@ impl Body {
     }
 }
 
-/// An expression.
+/// An expression with its place.
 #[derive(Clone, Debug)]
 pub struct Expression {
     /// Kind of the expression.
@@ -263,7 +263,7 @@ pub struct Expression {
 /// The kinds of expression. Operators are calls.
 #[derive(Clone, Debug)]
 pub enum ExpressionKind {
-    /// A number.
+    /// A literal number.
     Number(f64),
     /// A named value.
     Name(Name),

@@ -72,7 +72,7 @@ const FUNCTIONS: &[(&str, &str)] = &[
     ("dihedral_angle", "dihedral(x1, x2, x3, x4)"),
 ];
 
-/// Names of numbers elsewhere, and what is written here.
+/// Names of numbers elsewhere, and their spelling here.
 const NUMBERS: &[(&str, &str)] = &[
     ("e", "exp(x) for eˣ, as in exp(-r^2), and exp(1) for the number e"),
     ("tau", "2 * π"),

@@ -30,7 +30,7 @@ pub(super) fn tokens_within(text: &Rc<str>, (start, end): (usize, usize), whole:
     lexer.tokens
 }
 
-/// A message, and the remedy; `None` if there is none.
+/// A message, and the remedy; `None` without one.
 type Complaint = (String, Option<String>);
 
 struct Lexer<'a> {

@@ -149,7 +149,7 @@ impl<'a> Parser<'a> {
         }
     }
 
-    /// Returns the error of the next token if its characters are no token.
+    /// Returns the error of the next token if its characters do not form a token.
     pub(super) fn fault(&self) -> Option<Box<Diagnostic>> {
         match &self.peek()?.kind {
             TokenKind::Broken(fault) => Some(fault.0.clone()),
@@ -415,7 +415,7 @@ impl<'a> Parser<'a> {
         })
     }
 
-    /// Parses `[unit]`; returns an empty unit if there is none.
+    /// Parses `[unit]`; returns an empty unit without one.
     fn unit(&mut self) -> Parsed<Unit> {
         if !self.take("[") {
             return Ok(Unit::default());

@@ -14,12 +14,12 @@ pub(super) enum Kind {
     Text(String),
     /// An operator, bracket or separator.
     Symbol(String),
-    /// Characters that are no token. The parser reports the error where it meets them, and nothing else of the same
-    /// declaration.
+    /// Characters that do not form a token. The parser reports the error where it meets them, and nothing else of the
+    /// same declaration.
     Broken(Fault),
 }
 
-/// Describes characters that are no token.
+/// Describes characters that do not form a token.
 #[derive(Clone, Debug)]
 pub(super) struct Fault(pub(super) Box<Diagnostic>);
 
@@ -160,14 +160,14 @@ const LONGEST_NUMBER: usize = 1100;
 
 /// Returns the token of a number, or of a string with notation.
 pub(super) fn literal_kind(text: &str, span: &Span, attribute: bool) -> Kind {
-    // Literals that begin with a digit are no strings. Parsing them takes the square of their length.
+    // Literals that begin with a digit are not strings. Parsing them takes the square of their length.
     let is_number = text.starts_with(|c: char| c.is_ascii_digit());
     if !is_number && let Ok(string) = syn::parse_str::<syn::LitStr>(text) {
         let content = string.value();
         return if attribute { Kind::Text(content) } else { Kind::Notation(notation::tokens(&content, span)) };
     }
     if text.starts_with('"') {
-        // Only rustc passes on a string that is no token.
+        // Only rustc passes on a string that is not a token.
         return Diagnostic::known_to_rustc(span).into();
     }
     if text.len() > LONGEST_NUMBER {

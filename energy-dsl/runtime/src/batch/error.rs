@@ -14,7 +14,7 @@ pub type Flagged = Vec<(usize, Flags<f64>)>;
 pub enum BatchError {
     /// A range that starts within a block or ends after the last element.
     Range {
-        /// The range.
+        /// The range that was asked for.
         range: Range<usize>,
         /// Number of packed elements.
         elements: usize,
@@ -90,7 +90,7 @@ pub(super) fn check_output(of: &'static str, given: usize, elements: usize, per:
     if given == needed { Ok(()) } else { Err(BatchError::Output { of, needed, given }) }
 }
 
-/// Not inlined: flags are rare.
+/// Kept out of line: flags are rare.
 #[cold]
 #[inline(never)]
 pub(super) fn note_flags<M: Mask>(flagged: &mut Flagged, first: usize, count: usize, degenerate: M, kink: M) {

@@ -135,7 +135,7 @@ impl<S: Real, E: Stored<S>> Packed<E, S> {
         self.elements
     }
 
-    /// Returns whether there are no elements.
+    /// Returns whether it is empty.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.elements == 0
@@ -202,7 +202,7 @@ impl<S: Real, E: Stored<S>> Packed<E, S> {
     /// Replaces an element and keeps its stencil.
     ///
     /// # Panics
-    /// When there is no such element.
+    /// If `index` is not below the number of elements.
     pub fn set(&mut self, element: usize, to: &E) {
         assert!(element < self.elements, "element {element} of {}", self.elements);
         self.write(element, to);
@@ -224,7 +224,7 @@ impl<S: Real + Lane<S>, E: PackedPotential<S>> Packed<E, S> {
     /// Returns one element, unpacked.
     ///
     /// # Panics
-    /// When there is no such element.
+    /// If `index` is not below the number of elements.
     #[must_use]
     pub fn element(&self, element: usize) -> E::Wide<S> {
         assert!(element < self.elements, "element {element} of {}", self.elements);

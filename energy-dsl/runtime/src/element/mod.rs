@@ -60,7 +60,8 @@ impl std::error::Error for RestError {}
 /// typed traits are faster.
 #[derive(Clone, Copy, Debug)]
 pub struct Inputs<'a, T> {
-    /// Parameters. For a constraint, its stiffness k_s and damping k_d come last.
+    /// Parameters, flattened, in the order of the declaration. For a constraint, its stiffness k_s and damping k_d come
+    /// last.
     pub parameters: &'a [T],
     /// Rest-shape inputs.
     pub rest: &'a [T],
@@ -105,7 +106,7 @@ pub trait Element: Copy {
 /// An element behind a function pointer, for tools that treat all elements in the same way.
 #[derive(Clone, Copy, Debug)]
 pub struct AnyElement {
-    /// The declaration.
+    /// The declaration that it was compiled from.
     pub declaration: &'static Declaration,
     /// Evaluates all blocks in double precision, as [`Element::evaluate`] does.
     pub evaluate: fn(&Inputs<'_, f64>) -> Result<Outputs<f64>, RestError>,

@@ -259,12 +259,12 @@ impl Kernel for SineCosine<'_> {
     }
 }
 
-/// What is known of coefficients.
+/// Knowledge about coefficients.
 #[derive(Clone, Copy)]
 struct Extent {
     /// Whether all numbers are 0 or of moderate size.
     are_moderate: bool,
-    /// How many of the first coefficients are 0.
+    /// The number of leading coefficients that are 0.
     zeros: usize,
 }
 
@@ -310,8 +310,8 @@ impl List {
         Self::filled(rows.len(), |_, new| new.copy_from_slice(rows)).0
     }
 
-    /// Computes coefficients and drops the first ones that are 0. Returns also how many these are; `None` if a number is
-    /// too large or too small.
+    /// Computes coefficients and drops the first ones that are 0. Returns also how many these are; `None` if a number
+    /// is too large or too small.
     pub(super) fn computed(count: usize, operation: Operation<Self>) -> Option<(Self, usize)> {
         let (list, extent) = Self::filled(count, |all, rows| dispatch(Compute { operation: operation.on(all), rows }));
         extent.are_moderate.then(|| (list.after(extent.zeros), extent.zeros))

@@ -32,8 +32,8 @@ pub(super) fn register() -> u32 {
     })
 }
 
-/// Compares a difference with 0. Returns the rays along which it is negative, and those along which it is 0. The outcome
-/// may be reversed.
+/// Compares a difference with 0. Returns the rays along which it is negative, and those along which it is 0. The
+/// outcome may be reversed.
 pub(super) fn compare(comparison: u32, difference: &Bundle) -> [Outcomes; 2] {
     let terms = difference.first();
     MADE.with_borrow_mut(|all| all[comparison as usize] = terms);

@@ -31,7 +31,7 @@ pub trait Lane<S: Number>: Real {
     /// Gathers the points at the first [`Self::LANES`] indices; returns x, y and z.
     ///
     /// # Panics
-    /// When there is no such point, or there are fewer indices.
+    /// If a point does not exist, or indices are too few.
     #[inline(always)]
     fn gather(points: &[[S; 3]], indices: &[u32]) -> [Self; 3] {
         gather_by_element(points, indices)
@@ -73,7 +73,7 @@ pub trait Lane<S: Number>: Real {
     }
 }
 
-/// [`Lane::gather`], number by number. AVX-512 gather instructions are no faster.
+/// [`Lane::gather`], number by number. AVX-512 gather instructions are not faster.
 #[inline(always)]
 pub fn gather_by_element<S: Number, V: Lane<S>>(points: &[[S; 3]], indices: &[u32]) -> [V; 3] {
     assert!(indices.len() >= V::LANES, "{} lanes from {} indices", V::LANES, indices.len());

@@ -27,7 +27,7 @@ pub struct Baseline;
 
 /// Code that can be compiled for any [`Level`].
 pub trait Kernel {
-    /// The result.
+    /// The result of the kernel.
     type Output;
     /// Runs the code. Mark implementations `#[inline(always)]`: only inlined code is compiled for the level.
     fn run<L: Level>(self) -> Self::Output;

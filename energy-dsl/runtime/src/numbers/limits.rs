@@ -50,7 +50,7 @@ const SURE: f64 = 1e5;
 /// Rays that tell a kink, where derivatives have some values, from a singularity.
 const MANY: usize = 24;
 
-/// Replaces results by their limits, or by the documented values where there is none, and sets the flags.
+/// Replaces results by their limits, or by the documented values without a limit, and sets the flags.
 ///
 /// - `degenerate` is set if a result is not finite or replaces a limit that does not exist.
 /// - `kink` is set if a derivative has different limits on different sides. The result is one of them.
@@ -152,7 +152,8 @@ struct Rays<'a> {
     along: Along<'a>,
     /// Indices of the results of each group.
     ranges: Vec<Range<usize>>,
-    /// Groups that all rays have results of. If the last of them has no limit, later ones, its derivatives, have none.
+    /// Groups that all rays have results of. If the last of them has no limit, the later ones, its derivatives, lack
+    /// limits, too.
     evaluated: usize,
     paths: Vec<Path>,
     /// Whether all values are undefined along all rays, as those of √(−1).
@@ -246,8 +247,8 @@ impl<'a> Rays<'a> {
         !limits[..values].iter().any(|value| matches!(value, Limit::Unknown | Limit::Open))
     }
 
-    /// Returns whether a result of this group is infinite along a ray, or has a number of its own on each ray that is
-    /// more than rounding; or whether no ray is inside of the domain.
+    /// Returns whether a result of this group is infinite along a ray, or differs from ray to ray by more than rounding;
+    /// or whether no ray is inside of the domain.
     fn has_surely_no_limit(&self, group: usize, found: &[Found]) -> bool {
         let rays = || found.iter().filter_map(|ray| ray.limits.as_deref()).filter(|limits| self.is_inside(limits));
         rays().next().is_none()
@@ -286,8 +287,8 @@ impl<'a> Rays<'a> {
         group.has_limits() || group.range.clone().any(is_scattered) || group.range.clone().all(has_sides)
     }
 
-    /// Looks for rays into narrow regions where the formula takes another branch, with other results than those of these
-    /// groups. Returns whether there are any.
+    /// Looks for rays into narrow regions where the formula takes another branch, with other results than those of
+    /// these groups. Returns whether there are any.
     fn cast_into_narrow_regions(&mut self, groups: &[Group<'_>]) -> bool {
         let rays: Vec<Evaluated<'_>> = self.paths.iter().map(Path::evaluated).collect();
         let (routine, moves) = (self.routine(), self.roles.moves);
@@ -405,8 +406,8 @@ impl<'a> Rays<'a> {
         self.numbers(result).map(|number| relative(number, scale)).collect()
     }
 
-    /// Returns the size of each group, which its rounding errors are relative to: its largest limit, or the contribution
-    /// of its derivatives over the distance of the input from 0.
+    /// Returns the size of each group, which its rounding errors are relative to: its largest limit, or the
+    /// contribution of its derivatives over the distance of the input from 0.
     fn scales(&self) -> Vec<Unbounded<f64>> {
         let largest = |numbers: &mut dyn Iterator<Item = Unbounded<f64>>| numbers.fold(zero(), |a, b| a.max(b.abs()));
         let moving = self.inputs.iter().zip(self.roles.moves).filter(|(input, moves)| **moves && input.is_finite());

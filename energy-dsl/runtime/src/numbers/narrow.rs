@@ -113,8 +113,8 @@ impl Search<'_> {
         (0..self.moves.len()).filter(|&i| self.moves[i])
     }
 
-    /// Makes the difference smaller until it has the other sign: a pattern search with a step per slope. The slopes of a
-    /// bundle of rays are changed at once, both up and down.
+    /// Makes the difference smaller until it has the other sign: a pattern search with a step per slope. The slopes of
+    /// a bundle of rays are changed at once, both up and down.
     fn descend(&self, start: Point, is_other: &dyn Fn(&Point) -> bool) -> Point {
         let mut best = start;
         let mut steps: Vec<(usize, f64)> = self.moving().map(|i| (i, 0.5)).collect();

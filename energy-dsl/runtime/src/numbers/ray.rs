@@ -51,7 +51,7 @@ pub(super) struct Singular<'a> {
 
 impl Singular<'_> {
     /// Returns what the routine computes at x + slope · ε for the slopes of each ray. Bundle by bundle, it evaluates
-    /// group after group while `goes_on`, from what is known along the rays of the bundle.
+    /// group after group while `goes_on`, from the knowledge about the rays of the bundle.
     pub(super) fn evaluate(self, slopes: &[Vec<f64>], goes_on: &mut dyn FnMut(usize, &[Found]) -> bool) -> Vec<Found> {
         let slopes: Vec<&Vec<f64>> = slopes.iter().collect();
         slopes.chunks(LANES).flat_map(|slopes| self.evaluate_bundle(slopes, goes_on)).collect()
@@ -372,7 +372,7 @@ mod tests {
             let rays: Vec<&Vec<f64>> = slopes.iter().collect();
             let [short, rows, series] =
                 LENGTHS.map(|length| routine.evaluate_to(length, &rays, None, &mut |_, _| true));
-            // Where short rows tell nothing, they say so.
+            // Short rows that tell nothing say so.
             let is_short = short.iter().any(Found::is_open);
             let rows = if is_short { rows } else { [short, rows].concat() };
             for (ray, (rows, series)) in rows.iter().zip(series.iter().cycle()).enumerate() {

@@ -1,7 +1,7 @@
 //! Numbers along rays that are computed when they are asked for.
 //!
 //! At a singular input, a routine records what it would compute. Only comparisons and results ask for numbers. If the
-//! values tell that there is no limit, no derivative is computed.
+//! values show that a limit does not exist, no derivative is computed.
 
 use super::bundle::Bundle;
 use super::comparisons;

@@ -210,7 +210,7 @@ impl Series {
         !self.is_defined() && self.unknown.logs <= 0.0
     }
 
-    /// Returns what is known of a function of this series that needs its first term, if there is none.
+    /// Returns what is known of a function of this series that needs its first term, without such a term.
     fn without_terms(&self) -> Self {
         match () {
             () if !self.is_defined() => self.clone(),

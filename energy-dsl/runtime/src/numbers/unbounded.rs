@@ -142,8 +142,8 @@ macro_rules! operator {
     ($trait:ident, $method:ident, |$a:ident, $b:ident| $result:expr) => {
         impl<S: Scalar> $trait for Unbounded<S> {
             type Output = Self;
-            // Not inlined: general paths are thousands of operations and cold, so calls keep them small and quick to
-            // compile.
+            // Kept out of line: general paths are thousands of operations and cold, so calls keep them small and quick
+            // to compile.
             #[inline(never)]
             fn $method(self, other: Self) -> Self {
                 let ($a, $b) = (self, other);

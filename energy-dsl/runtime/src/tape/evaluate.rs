@@ -176,7 +176,7 @@ pub struct Expander<'a, S> {
 }
 
 impl<'a, S: Float> Expander<'a, S> {
-    /// Prepares the expansion of energies; `None` if elements of this kind have none.
+    /// Prepares the expansion of energies; `None` if elements of this kind lack it.
     #[must_use]
     pub fn new(elements: &'a TapeElements<S>) -> Option<Self> {
         let routine = elements.routines.expansion.as_ref()?;

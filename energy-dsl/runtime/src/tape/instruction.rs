@@ -5,7 +5,7 @@ use super::operation::Operation;
 /// One operation on slots. Numbers and masks have slots of their own.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Instruction {
-    /// The operation.
+    /// The operation to perform.
     pub operation: Operation,
     /// Slot of the result.
     pub target: u16,
@@ -45,6 +45,6 @@ pub struct Tape {
     pub constants: Vec<(u16, Constant)>,
     /// Mask slots of constants.
     pub truths: Vec<(u16, bool)>,
-    /// The instructions.
+    /// The instructions, in order.
     pub instructions: Vec<Instruction>,
 }

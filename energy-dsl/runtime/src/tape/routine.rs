@@ -55,7 +55,7 @@ impl Repetition {
 pub enum TermNumber {
     /// Index among the stored numbers of the element.
     Stored(usize),
-    /// A constant.
+    /// A constant of the formula.
     Constant(f64),
 }
 
@@ -72,7 +72,7 @@ pub struct Routine {
     pub groups: Vec<Vec<u16>>,
     /// Mask slots of the flags of the ordinary path: degenerate, kink.
     pub flags: [Option<u16>; 2],
-    /// The general path; `None` if there are no precautions.
+    /// The general path; `None` without precautions.
     pub general: Option<General>,
 }
 

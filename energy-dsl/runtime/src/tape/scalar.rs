@@ -19,7 +19,7 @@ impl<T: Number> Values<T> {
         self.numbers[usize::from(slot)].clone()
     }
 
-    /// Returns the mask in a slot; false if there is none.
+    /// Returns the mask in a slot; false without one.
     #[must_use]
     pub fn mask(&self, slot: Option<u16>) -> T::Mask {
         slot.map_or_else(T::Mask::none, |slot| self.masks[usize::from(slot)])

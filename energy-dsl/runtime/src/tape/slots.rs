@@ -100,13 +100,14 @@ impl<S: Float> Slots<S> {
     }
 }
 
-/// Not generic, so that the interpreter is compiled in this crate alone: it is 170 kB of code with all SIMD levels.
+/// This is not generic, so that the interpreter is compiled in this crate alone: it is 170 kB of code with all SIMD
+/// levels.
 #[inline(never)]
 fn run_doubles(slots: &mut Slots<f64>, routine: &Routine, count: usize) {
     slots.run_here(routine, count);
 }
 
-/// As [`run_doubles`].
+/// Like [`run_doubles`].
 #[inline(never)]
 fn run_singles(slots: &mut Slots<f32>, routine: &Routine, count: usize) {
     slots.run_here(routine, count);

@@ -35,14 +35,14 @@ struct ScaledFactor<T> {
     targets: [u32; 4],
 }
 
-/// No contacts.
+/// A set without contacts.
 impl<T> Default for DomainContacts<T> {
     fn default() -> Self {
         Self { rows: Vec::new(), factors: Vec::new() }
     }
 }
 
-/// Returns the diagonal blocks of Σ (c cᵀ) ⊗ B by row; an empty list if there are no contacts.
+/// Returns the diagonal blocks of Σ (c cᵀ) ⊗ B by row; an empty list without contacts.
 pub(crate) fn contact_diagonals(contacts: &[Contact], rows: usize) -> Vec<Block<f64>> {
     if contacts.is_empty() {
         return Vec::new();

@@ -3,7 +3,7 @@ use energy_dsl::{Baseline, Block, triangle_index};
 use super::square::{AnySquare, Square};
 use super::{Curvature, fill_scaled, jacobi};
 
-/// Projects the symmetric matrix with the given triangle of blocks: for elements whose coordinates are no independent
+/// Projects the symmetric matrix with the given triangle of blocks: for elements whose coordinates are not independent
 /// differences of points. Returns whether an eigenvalue was changed. A matrix with a non-finite entry is left
 /// unchanged.
 pub fn change_dense(triangle: &mut [Block<f64>], points: usize, curvature: Curvature) -> bool {

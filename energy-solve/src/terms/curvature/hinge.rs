@@ -36,8 +36,8 @@
 //! |H| = |f″| ∇θ ∇θᵀ + |f′| (|S₁| + |S₂|).
 //! ```
 //!
-//! Both are positive semi-definite, and so are their differences to H. Neither is the nearest such matrix, for which
-//! there is no closed form. On nearly regular triangles, the trace of ½ (H + |H|) is larger than that of the nearest
+//! Both are positive semi-definite, and so are their differences to H. Neither is the nearest such matrix, which has
+//! no closed form. On nearly regular triangles, the trace of ½ (H + |H|) is larger than that of the nearest
 //! matrix by 5 % for f′ = f″/10, and by 19 % for f′ = f″.
 
 use energy_dsl::{Kernel, Lane, Level, Mask};
@@ -170,7 +170,7 @@ impl<V: Lane<f64>> Wing<V> {
         let ratio = area_squared * per_area * edge.per_squared;
         let foot = dot::<L, V>(edge.vector, apex) * edge.per_squared;
 
-        // By all four points and in units of 1/h², with C = 1 + s² + (1 − s)², k = 1 − 2 s and r = h/L:
+        // In terms of all four points and in units of 1/h², with C = 1 + s² + (1 − s)², k = 1 − 2 s and r = h/L:
         // G = [C, k r; k r, 2 r²] and W = [C, ½ k r; ½ k r, C + ½ r²].
         let squared = ratio * ratio;
         let (c, k) = (two * foot.mul_add::<L>(foot - one, one), one - two * foot);

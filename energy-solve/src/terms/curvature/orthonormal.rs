@@ -17,7 +17,7 @@ pub(crate) struct Orthonormal {
 }
 
 impl Orthonormal {
-    /// Creates the transformation for a declaration. `None` if there are no difference vectors, or they are linearly
+    /// Creates the transformation for a declaration. `None` without difference vectors, or if they are linearly
     /// dependent.
     pub(crate) fn new(declaration: &Declaration) -> Option<Self> {
         let vectors = &*declaration.reduced_vectors;

@@ -177,7 +177,7 @@ type Reduced<E, V> = ReducedHessian<
     <<E as PackedPotential<f64>>::Wide<V> as ReducedPotential<V>>::Upper,
 >;
 
-/// Expands the results of a batch and adds them to a linearisation. A [`Kernel`] of its own is compiled for the SIMD
+/// Expands the results of a batch and adds them to a linearisation. Its own [`Kernel`] is compiled for the SIMD
 /// level without being inlined.
 struct Expansion<'k, 'a, 'b, E: PackedPotential<f64>, V: Lane<f64>> {
     to: &'k mut Hessians<'a, 'b>,

@@ -1,8 +1,8 @@
 //! Elements in lanes whose Hessians wait for projection.
 //!
-//! Few Hessians are indefinite in most places, and eigenvalues of eight cost as much as those of one. So a batch with an
-//! indefinite Hessian waits, and those after it, until there are enough to fill all lanes. Then all of them are added in
-//! their order.
+//! Few Hessians are indefinite in most places, and eigenvalues of eight cost as much as those of one. So a batch with
+//! an indefinite Hessian waits, and those after it, until there are enough to fill all lanes. Then all of them are
+//! added in their order.
 
 use energy_dsl::{Lane, Level};
 
@@ -70,7 +70,8 @@ impl Waiting {
         self.open.len() >= lanes || self.batches.len() >= MOST
     }
 
-    /// Adds a batch with its U, gradient, upper triangle and vectors. `open` marks the lanes with an indefinite Hessian.
+    /// Adds a batch with its U, gradient, upper triangle and vectors. `open` marks the lanes with an indefinite
+    /// Hessian.
     #[inline(always)]
     pub(super) fn hold<V: Lane<f64>>(
         &mut self,

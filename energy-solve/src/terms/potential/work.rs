@@ -191,7 +191,7 @@ impl<'a> Hessians<'a, '_> {
     }
 }
 
-/// What is known of the Hessians in lanes, as bits.
+/// Known properties of the Hessians in lanes, as bits.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Examined {
     /// Lanes with an indefinite Hessian.
@@ -266,7 +266,7 @@ fn subtract_product<V: Lane<f64>>(
     buffer.subtract(lanes, sums, first_vertex, product);
 }
 
-/// Fallback for elements whose coordinates are no independent differences of points. Returns a bit mask of the changed
+/// Fallback for elements whose coordinates are not independent differences of points. Returns a bit mask of the changed
 /// lanes.
 #[inline(never)]
 fn change_one_by_one<V: Lane<f64>>(triangle: &mut [[Vector3<V>; 3]], count: usize, curvature: Curvature) -> u32 {

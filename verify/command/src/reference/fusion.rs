@@ -112,7 +112,7 @@ pub(super) struct Case<'a> {
     family: &'static str,
     id: String,
     value: &'a Value,
-    /// Whether there is no true value to compare with.
+    /// Whether a true value to compare with is missing.
     evaluated_only: bool,
 }
 
@@ -223,8 +223,8 @@ pub fn fusion_reference(path: &Path) -> Result<Vec<FamilyLine>, RecordError> {
 }
 
 /// Evaluates the cases of a file of body tracking, of any families, and writes them with `out` filled by the generated
-/// code: the numbers of each array in order, with 17 digits. Returns the number of cases; `None` if the file has none
-/// of the families.
+/// code: the numbers of each array in order, with 17 digits. Returns the number of cases; `None` if the file lacks all
+/// families.
 ///
 /// # Errors
 /// If the input is malformed, or the output cannot be written. Nothing is written then.

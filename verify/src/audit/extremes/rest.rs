@@ -20,7 +20,7 @@ pub(super) struct RestShape {
 }
 
 impl RestShape {
-    /// Returns the rest shape of an input, rounded; `None` if the element has none.
+    /// Returns the rest shape of an input, rounded; `None` for elements without.
     pub(super) fn of(declaration: &Declaration, sample: &Sample) -> Option<Self> {
         let dimension = declaration.rest.first()?.size;
         let fits = (2..=3).contains(&dimension)

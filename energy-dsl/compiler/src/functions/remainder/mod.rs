@@ -8,8 +8,8 @@
 //! incomplete Γ   γₖ(x) = e⁻ˣ φₖ(x)                (1 − e⁻ˣ (1 + x))/x² = γ₂
 //! ```
 //!
-//! which are regular at 0. cₖ are Stumpff's functions. xᵏ γₖ(x) damps dispersion forces between atoms (Tang and Toennies
-//! 1984).
+//! which are regular at 0. cₖ are Stumpff's functions. xᵏ γₖ(x) damps dispersion forces between atoms (Tang and
+//! Toennies 1984).
 
 mod incomplete_gamma;
 mod monomial;

@@ -245,8 +245,8 @@ fn term_by_term(g: &mut Graph, above: NodeId, below: NodeId) -> Option<NodeId> {
     quotients.map(|quotients| g.sum(quotients))
 }
 
-/// Cancels a factor that vanishes on both sides at the same inputs. The quotient has the limit there, but its derivatives
-/// would lose all digits.
+/// Cancels a factor that vanishes on both sides at the same inputs. The quotient has the limit there, but its
+/// derivatives would lose all digits.
 fn without_common_factor(g: &mut Graph, above: NodeId, below: NodeId) -> Option<NodeId> {
     let [above, below] = [above, below].map(|side| Monomial::of(g, side, &[]));
     let is_shared = |node: &NodeId| {

@@ -164,7 +164,7 @@ pub fn available() -> impl Iterator<Item = LevelName> {
     LevelName::ALL.into_iter().filter(|&name| name <= detected())
 }
 
-/// The level that the program was compiled to require. If it is the best one, there is no choice left.
+/// The level that the program was compiled to require. If it is the best one, nothing is left to choose.
 const REQUIRED: Option<LevelName> = if cfg!(all(
     target_arch = "x86_64",
     target_feature = "avx512f",

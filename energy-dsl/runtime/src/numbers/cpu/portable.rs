@@ -72,7 +72,7 @@ macro_rules! array_register {
             type Mask = $mask;
             const LANES: usize = $lanes;
 
-            /// Not inlined, so that a kernel which several routines share is compiled once.
+            /// Kept out of line, so that a kernel which several routines share is compiled once.
             #[inline(never)]
             fn dispatch<K: Kernel>(kernel: K) -> K::Output {
                 kernel.run::<Baseline>()

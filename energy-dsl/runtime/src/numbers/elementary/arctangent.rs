@@ -83,7 +83,7 @@ fn octant<D: Double>(y: D, x: D) -> Octant<D> {
 #[inline(always)]
 fn angle<D: Double, L: Level>(y: D, x: D, Octant { steep, less, more }: Octant<D>) -> D {
     let (zero, one, two, four) = (D::splat(0.0), D::splat(1.0), D::splat(2.0), D::splat(4.0));
-    // Beyond π/8 the angle is π/4 + atan((less − more)/(less + more)).
+    // Angles above π/8 are π/4 + atan((less − more)/(less + more)).
     let far = (D::splat(0.414_213_562_373_095) * more).less(less);
     let (difference, difference_error) = fast_sum(more, -less);
     let (sum, sum_error) = fast_sum(more, less);

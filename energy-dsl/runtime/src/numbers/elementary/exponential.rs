@@ -25,7 +25,7 @@ const EXPONENTIAL: [f64; 11] = [
 /// Returns e^(x + low), where `low` is at most a few units in the last place of a large `x`.
 #[inline(always)]
 pub fn exp_of_sum<D: Double, L: Level>(x: D, low: D) -> D {
-    // Beyond these bounds the result is zero or infinite.
+    // The result is zero or infinite outside these bounds.
     let x = x.max(D::splat(-746.0)).min(D::splat(710.0));
     let count = x.mul_add::<L>(D::splat(std::f64::consts::LOG2_E), D::splat(ROUND)) - D::splat(ROUND);
     // The product is exact by construction; the difference is exact because the operands are close.

@@ -89,7 +89,7 @@ pub(crate) fn read_alone<T: Copy>(number: &T) -> T {
     unsafe { std::ptr::read_volatile(number) }
 }
 
-/// Not inlined: a scalar routine at a lower level should not bloat its callers.
+/// Kept out of line: a scalar routine at a lower level should not bloat its callers.
 #[inline(never)]
 fn run_plain<K: Kernel>(kernel: K) -> K::Output {
     kernel.run::<Baseline>()

@@ -81,7 +81,7 @@ fn store_rest<R: Register<Scalar = f64>>(
 /// Gathers the points of four indices; returns x, y and z. It is always inlined: a call would cost more than the work.
 ///
 /// # Panics
-/// When there is no such point, or there are fewer indices.
+/// If a point does not exist, or indices are too few.
 #[inline(always)]
 pub fn gather_4(points: &[[f64; 3]], indices: &[u32]) -> [__m256d; 3] {
     let indices = &indices[..4];
@@ -101,7 +101,7 @@ pub fn gather_4(points: &[[f64; 3]], indices: &[u32]) -> [__m256d; 3] {
 /// Gathers the points of eight indices; returns x, y and z.
 ///
 /// # Panics
-/// When there is no such point, or there are fewer indices.
+/// If a point does not exist, or indices are too few.
 #[inline(always)]
 pub fn gather_8(points: &[[f64; 3]], indices: &[u32]) -> [__m512d; 3] {
     let indices = &indices[..8];
