@@ -1,7 +1,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use mesh_obj::{ObjFile, ObjFileError};
+use mesh_io::obj::{ObjFile, ObjFileError};
 use nalgebra::Vector3;
 use serde::Deserialize;
 

@@ -1,6 +1,6 @@
 use std::path::{Path, PathBuf};
 
-use mesh_obj::{ObjFile, ObjFileError};
+use mesh_io::obj::{ObjFile, ObjFileError};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use energy_dsl::Vector3;
 
 use energy_files::excerpt;
-use mesh_obj::{Corner, Face, ObjFile, ObjFileError};
+use mesh_io::obj::{Corner, Face, ObjFile, ObjFileError};
 
 use super::{CornerAttributes, MeshError, TriangleMesh};
 

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use energy_files::excerpt;
 
-use crate::lines;
+use super::lines;
 
 /// The largest size of a file, in bytes: some three million vertices with faces.
 pub const LARGEST_FILE: u64 = 256 << 20;
@@ -142,12 +142,12 @@ impl ObjFile {
     ///
     /// ```
     /// use std::path::Path;
-    /// let file = mesh_obj::ObjFile::parse("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", Path::new("a.obj"))?;
+    /// let file = mesh_io::obj::ObjFile::parse("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", Path::new("a.obj"))?;
     /// let corners = file.corners(file.faces[0]);
     /// assert_eq!(corners.iter().map(|corner| corner.vertex()).collect::<Vec<_>>(), [0, 1, 2]);
-    /// let error = mesh_obj::ObjFile::parse("v 0 0 zero\n", Path::new("a.obj")).unwrap_err();
+    /// let error = mesh_io::obj::ObjFile::parse("v 0 0 zero\n", Path::new("a.obj")).unwrap_err();
     /// assert_eq!(error.to_string(), "a.obj:1: expected a number, got `zero`: `v 0 0 zero`");
-    /// # Ok::<(), mesh_obj::ObjFileError>(())
+    /// # Ok::<(), mesh_io::obj::ObjFileError>(())
     /// ```
     pub fn parse(text: &str, path: &Path) -> Result<Self, ObjFileError> {
         Self::parse_lines(text).map_err(|Malformed { line, reason, text }| {

@@ -1,13 +1,14 @@
-//! Reads Wavefront OBJ files as exporters write them, for all programs.
+//! Wavefront OBJ files, as exporters write them.
 //!
 //! [`ObjFile`] has the vertices, texture coordinates and faces of a file with their lines and groups. It makes no mesh:
 //! readers decide which faces they need and what a valid mesh is.
 //!
 //! A file may come from a stranger. It is a regular file of at most [`LARGEST_FILE`] bytes. A face has at most
-//! [`MOST_CORNERS`] corners and [`MOST_NAMES`] groups. Memory is at most 30 times the file.
-#![forbid(unsafe_code)]
+//! [`MOST_CORNERS`] corners and [`MOST_NAMES`] groups.
 
 mod file;
 mod lines;
+mod write;
 
 pub use file::{Corner, Face, LARGEST_FILE, LARGEST_UV, MOST_CORNERS, MOST_NAMES, ObjFile, ObjFileError};
+pub use write::{ObjMesh, last_obj_line, obj_text};

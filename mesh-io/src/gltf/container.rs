@@ -1,9 +1,8 @@
 //! The container of binary glTF: its header, its description in JSON, and its data.
 
-use gltf::binary::Glb;
-use gltf::json::Root;
-use gltf::json::mesh::{Primitive, Semantic};
-use gltf::json::validation::{Checked, Validate};
+use gltf_json::Root;
+use gltf_json::mesh::{Primitive, Semantic};
+use gltf_json::validation::{Checked, Validate};
 
 /// The largest number of JSON objects. Each takes up to 0.6 kB of memory, however short its text.
 const LARGEST_DESCRIPTION: usize = 400_000;
@@ -14,7 +13,7 @@ const HEADER: usize = 12;
 
 /// A part of a file that cannot be used.
 #[derive(Debug)]
-pub(super) struct Fault {
+pub struct Fault {
     /// The part, such as `accessor 3`.
     pub part: String,
     /// The reason, with a remedy if one is known.
@@ -22,14 +21,16 @@ pub(super) struct Fault {
 }
 
 impl Fault {
-    pub(super) fn new(part: impl Into<String>, reason: impl Into<String>) -> Self {
+    /// Creates a fault of a part.
+    #[must_use]
+    pub fn new(part: impl Into<String>, reason: impl Into<String>) -> Self {
         Self { part: part.into(), reason: reason.into() }
     }
 }
 
 /// A file whose description is valid in itself; accessors are not checked yet.
 #[derive(Debug)]
-pub(super) struct Container<'a> {
+pub struct Container<'a> {
     /// The description.
     pub root: Root,
     /// The data.
@@ -38,7 +39,15 @@ pub(super) struct Container<'a> {
 
 impl<'a> Container<'a> {
     /// Parses a file, and checks the references of its description.
-    pub(super) fn parse(bytes: &'a [u8]) -> Result<Self, Fault> {
+    ///
+    /// # Errors
+    /// If the file is no binary glTF with embedded data, or its description is malformed or too large.
+    ///
+    /// ```
+    /// let fault = mesh_io::gltf::Container::parse(b"no glTF").unwrap_err();
+    /// assert_eq!(fault.part, "the header");
+    /// ```
+    pub fn parse(bytes: &'a [u8]) -> Result<Self, Fault> {
         let (json, data) = chunks(bytes)?;
         if json.len() > LONGEST_DESCRIPTION {
             let reason = format!("expected at most {} MiB, got {} bytes", LONGEST_DESCRIPTION >> 20, json.len());
@@ -49,7 +58,7 @@ impl<'a> Container<'a> {
             let reason = format!("expected at most {LARGEST_DESCRIPTION} objects, got {objects}");
             return Err(Fault::new("the description", reason));
         }
-        let parsed = gltf::json::deserialize::from_slice::<Root>(json);
+        let parsed = gltf_json::deserialize::from_slice::<Root>(json);
         let root = parsed.map_err(|error| Fault::new("the description", error.to_string()))?;
         check_positions(&root)?;
         match first_error(&root) {
@@ -63,27 +72,42 @@ impl<'a> Container<'a> {
 fn chunks(bytes: &[u8]) -> Result<(&[u8], &[u8]), Fault> {
     let header = |reason: String| Fault::new("the header", reason);
     if !bytes.starts_with(b"glTF") {
-        let remedy = "expected `glTF`; export the body as one binary file (.glb)";
-        return Err(header(remedy.into()));
+        return Err(header("expected `glTF`; export the body as one binary file (.glb)".into()));
     }
-    let Some(&[v0, v1, v2, v3, l0, l1, l2, l3]) = bytes.get(4..HEADER) else {
+    let Some((&header_words, rest)) = bytes.split_first_chunk::<HEADER>() else {
         return Err(header(format!("expected {HEADER} bytes, got {}", bytes.len())));
     };
-    let (version, length) = (u32::from_le_bytes([v0, v1, v2, v3]), u32::from_le_bytes([l0, l1, l2, l3]));
+    let (version, length) = (word(&header_words[4..]), word(&header_words[8..]));
     if version != 2 {
         return Err(header(format!("expected version 2 of glTF, got {version}")));
     }
-    if length as usize != bytes.len() {
+    if length != bytes.len() {
         return Err(header(format!("it says {length} bytes, but the file has {}; is it complete?", bytes.len())));
     }
-    let glb = Glb::from_slice(bytes).map_err(|error| Fault::new("the chunks", error.to_string()))?;
-    match (glb.json, glb.bin) {
-        (std::borrow::Cow::Borrowed(json), Some(std::borrow::Cow::Borrowed(data))) => Ok((json, data)),
-        _ => Err(Fault::new("the chunks", "no embedded data; export the body as one binary file (.glb)")),
+    let (json, rest) = chunk(rest, b"JSON")?;
+    if rest.is_empty() {
+        return Err(Fault::new("the chunks", "no embedded data; export the body as one binary file (.glb)"));
     }
+    Ok((json, chunk(rest, b"BIN\0")?.0))
 }
 
-/// Checks the positions of all primitives, which the validation of `gltf` takes for granted.
+/// Returns the contents of the first chunk, which must be of this type, and the bytes after it.
+fn chunk<'a>(bytes: &'a [u8], expected: &[u8; 4]) -> Result<(&'a [u8], &'a [u8]), Fault> {
+    let name = expected.escape_ascii();
+    let fault = |reason: &str| Fault::new("the chunks", format!("expected `{name}`: {reason}"));
+    let (head, rest) = bytes.split_first_chunk::<8>().ok_or_else(|| fault("the file ends in its head"))?;
+    if head[4..] != expected[..] {
+        return Err(fault("there is a chunk of another type"));
+    }
+    rest.split_at_checked(word(head)).ok_or_else(|| fault("it is longer than the file"))
+}
+
+/// Returns the little-endian number in the first four bytes.
+fn word(bytes: &[u8]) -> usize {
+    u32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]) as usize
+}
+
+/// Checks the positions of all primitives, which the validation of `gltf_json` takes for granted.
 fn check_positions(root: &Root) -> Result<(), Fault> {
     for (number, mesh) in root.meshes.iter().enumerate() {
         let positions = |primitive: &Primitive| primitive.attributes.get(&Checked::Valid(Semantic::Positions)).copied();
@@ -96,10 +120,10 @@ fn check_positions(root: &Root) -> Result<(), Fault> {
     Ok(())
 }
 
-/// Returns the first error that the validation of `gltf` finds; `None` if there is none.
+/// Returns the first error that the validation of `gltf_json` finds; `None` if there is none.
 fn first_error(root: &Root) -> Option<Fault> {
     let mut first = None;
-    root.validate(root, gltf::json::Path::new, &mut |path, error| {
+    root.validate(root, gltf_json::Path::new, &mut |path, error| {
         first.get_or_insert_with(|| Fault::new(path().to_string(), error.to_string()));
     });
     first
