@@ -10,7 +10,7 @@
 //! Nothing here decides which parts of a file are needed, or what a valid surface or body is.
 //!
 //! Files may come from strangers. The peak of memory of a reader, with its result, is at most 20 times the file and
-//! 300 MB; a file that would need more is refused. `tests/memory.rs` measures it.
+//! 300 MB; a file that would need more is refused. The test `memory` of `fuzz-targets` measures it.
 #![forbid(unsafe_code)]
 
 pub mod animation;

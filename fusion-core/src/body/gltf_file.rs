@@ -48,7 +48,7 @@ pub enum GltfError {
 /// bind matrices give the joints' positions at rest. A bone's tail is the mean of its children's heads, or its own head
 /// without children.
 ///
-/// Everything that the file says about its data is checked before it is used. Memory is at most 20 times the file, and
+/// Everything that the file says about its data is checked before it is used. Memory is at most 20 times the file and
 /// 300 MB.
 ///
 /// # Errors

@@ -38,7 +38,8 @@ pub fn vertex_normals(vertices: &[Vector3<f64>], triangles: &[[u32; 3]]) -> Vec<
             normals[vertex as usize] += normal;
         }
     }
-    normals.iter().map(|normal| normal.try_normalize(0.0).unwrap_or_default()).collect()
+    normals.iter_mut().for_each(|normal| *normal = normal.try_normalize(0.0).unwrap_or_default());
+    normals
 }
 
 /// Formats a mesh as Wavefront OBJ, with micrometre precision.

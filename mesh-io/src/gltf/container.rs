@@ -4,10 +4,13 @@ use gltf_json::Root;
 use gltf_json::mesh::{Primitive, Semantic};
 use gltf_json::validation::{Checked, Validate};
 
-/// The largest number of JSON objects. Each takes up to 0.6 kB of memory, however short its text.
-const LARGEST_DESCRIPTION: usize = 400_000;
-/// The largest description, in bytes. Lists of numbers that are not used here take up to 32 times their text.
-const LONGEST_DESCRIPTION: usize = 16 << 20;
+/// The largest description, in bytes.
+pub const LARGEST_DESCRIPTION: usize = 16 << 20;
+/// The largest number of JSON objects and lists in a description. Each takes up to 0.5 kB of memory, however short its
+/// text.
+pub const MOST_PARTS: usize = 400_000;
+/// The largest number of commas in a description. Each separates two values, of up to 0.1 kB of memory.
+pub const MOST_COMMAS: usize = 2_000_000;
 /// Length of the header, in bytes.
 const HEADER: usize = 12;
 
@@ -49,15 +52,7 @@ impl<'a> Container<'a> {
     /// ```
     pub fn parse(bytes: &'a [u8]) -> Result<Self, Fault> {
         let (json, data) = chunks(bytes)?;
-        if json.len() > LONGEST_DESCRIPTION {
-            let reason = format!("expected at most {} MiB, got {} bytes", LONGEST_DESCRIPTION >> 20, json.len());
-            return Err(Fault::new("the description", reason));
-        }
-        let objects = json.iter().filter(|&&byte| byte == b'{').count();
-        if objects > LARGEST_DESCRIPTION {
-            let reason = format!("expected at most {LARGEST_DESCRIPTION} objects, got {objects}");
-            return Err(Fault::new("the description", reason));
-        }
+        check_size(json).map_err(|reason| Fault::new("the description", reason))?;
         let parsed = gltf_json::deserialize::from_slice::<Root>(json);
         let root = parsed.map_err(|error| Fault::new("the description", error.to_string()))?;
         check_positions(&root)?;
@@ -66,6 +61,21 @@ impl<'a> Container<'a> {
             None => Ok(Self { root, data }),
         }
     }
+}
+
+/// Checks that a description does not take much more memory than its text.
+fn check_size(json: &[u8]) -> Result<(), String> {
+    if json.len() > LARGEST_DESCRIPTION {
+        return Err(format!("expected at most {} MiB, got {} bytes", LARGEST_DESCRIPTION >> 20, json.len()));
+    }
+    let count = |kinds: &[u8]| json.iter().filter(|byte| kinds.contains(byte)).count();
+    for (kinds, most, what) in [(&b"{["[..], MOST_PARTS, "objects and lists"), (b",", MOST_COMMAS, "commas")] {
+        let found = count(kinds);
+        if found > most {
+            return Err(format!("expected at most {most} {what}, got {found}"));
+        }
+    }
+    Ok(())
 }
 
 /// Returns the description and the data of a file.

@@ -9,5 +9,5 @@ mod accessor;
 mod container;
 
 pub use accessor::{Accessors, Usage, Values};
-pub use container::{Container, Fault};
+pub use container::{Container, Fault, LARGEST_DESCRIPTION, MOST_COMMAS, MOST_PARTS};
 pub use gltf_json as json;

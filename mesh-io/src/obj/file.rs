@@ -13,6 +13,8 @@ pub const LARGEST_FILE: u64 = 256 << 20;
 pub const MOST_CORNERS: usize = 1 << 16;
 /// The largest number of groups of a face.
 pub const MOST_NAMES: usize = 16;
+/// The largest number of names of groups, objects and materials of a file.
+pub const MOST_FILE_NAMES: usize = 1 << 18;
 /// The largest texture coordinate. Files of results hold them in single precision.
 pub const LARGEST_UV: f64 = 1e9;
 
@@ -101,8 +103,10 @@ pub struct ObjFile {
     /// Names of groups, objects and materials, in the order of the file.
     pub names: Vec<String>,
     corners: Vec<Corner>,
-    /// Sets of groups, object and material that faces have, as indices of names.
-    group_sets: Vec<Vec<usize>>,
+    /// Sets of groups, object and material that faces have: ranges of [`Self::set_names`].
+    group_sets: Vec<(u32, u32)>,
+    /// Indices of names.
+    set_names: Vec<u32>,
 }
 
 /// A malformed line: its number from 1, the problem, and its text.
@@ -112,16 +116,55 @@ struct Malformed {
     text: String,
 }
 
-/// The groups, object and material of the following faces.
-#[derive(Default)]
+/// The groups, object and material of the following faces, and what the file may still have.
 struct Current {
-    groups: Vec<usize>,
-    object: Option<usize>,
-    material: Option<usize>,
+    groups: Vec<u32>,
+    object: Option<u32>,
+    material: Option<u32>,
     /// Index of their set; `None` before the first face.
     set: Option<u32>,
     /// Index of each name.
-    known: BTreeMap<String, usize>,
+    known: BTreeMap<String, u32>,
+    triangles: Quota,
+    /// Triangles, each as often as it has names.
+    named: Quota,
+}
+
+/// A number of triangles that a file may have. Polygons of short numbers would have one for every two bytes, and
+/// programs take a hundred bytes for each.
+struct Quota {
+    most: usize,
+    left: usize,
+    what: &'static str,
+}
+
+impl Quota {
+    fn new(most: usize, what: &'static str) -> Self {
+        Self { most, left: most, what }
+    }
+
+    fn charge(&mut self, count: usize) -> Result<(), String> {
+        let Self { most, what, .. } = *self;
+        let left = self.left.checked_sub(count);
+        self.left =
+            left.ok_or_else(|| format!("a file of this size has at most {most} {what}; are faces repeated?"))?;
+        Ok(())
+    }
+}
+
+impl Current {
+    /// Begins a file of this size, in bytes.
+    fn new(size: usize) -> Self {
+        Self {
+            groups: Vec::new(),
+            object: None,
+            material: None,
+            set: None,
+            known: BTreeMap::new(),
+            triangles: Quota::new(1_000_000 + size / 16, "triangles"),
+            named: Quota::new(2_000_000 + size / 6, "triangles, counted in each of their groups"),
+        }
+    }
 }
 
 impl ObjFile {
@@ -170,12 +213,13 @@ impl ObjFile {
     /// # Panics
     /// If the face belongs to another file.
     #[must_use]
-    pub fn groups(&self, face: Face) -> &[usize] {
-        &self.group_sets[face.groups as usize]
+    pub fn groups(&self, face: Face) -> &[u32] {
+        let (start, end) = self.group_sets[face.groups as usize];
+        &self.set_names[start as usize..end as usize]
     }
 
     fn parse_lines(text: &str) -> Result<Self, Malformed> {
-        let (mut file, mut current) = (Self::default(), Current::default());
+        let (mut file, mut current) = (Self::default(), Current::new(text.len()));
         let malformed = |line: usize, text: &str, reason: String| {
             let text = excerpt(text.trim()).into_owned();
             Malformed { line, reason, text }
@@ -183,6 +227,8 @@ impl ObjFile {
         for (line, text) in lines::logical(text) {
             file.add(line, &text, &mut current).map_err(|reason| malformed(line, &text, reason))?;
         }
+        drop(current);
+        file.shrink();
         let broken = file.faces.iter().find_map(|face| Some((face.line(), file.missing(*face)?)));
         let Some((line, reason)) = broken else { return Ok(file) };
         let text = lines::logical(text).find(|(number, _)| *number == line);
@@ -211,12 +257,12 @@ impl ObjFile {
                 if names.len() > MOST_NAMES {
                     return Err(format!("expected at most {MOST_NAMES} groups"));
                 }
-                current.groups = names.into_iter().map(|name| self.name(name, current)).collect();
+                current.groups = names.into_iter().map(|name| self.name(name, current)).collect::<Result<_, _>>()?;
                 current.set = None;
             }
             Some(keyword @ ("o" | "usemtl")) => {
                 let name = text.trim_start()[keyword.len()..].trim();
-                let named = (!name.is_empty()).then(|| self.name(name, current));
+                let named = if name.is_empty() { None } else { Some(self.name(name, current)?) };
                 *(if keyword == "o" { &mut current.object } else { &mut current.material }) = named;
                 current.set = None;
             }
@@ -245,21 +291,42 @@ impl ObjFile {
         }
         let groups = *current.set.get_or_insert_with(|| {
             let named = current.groups.iter().copied().chain(current.object).chain(current.material);
-            self.group_sets.push(named.collect::<BTreeSet<usize>>().into_iter().collect());
+            let start = self.set_names.len() as u32;
+            self.set_names.extend(named.collect::<BTreeSet<u32>>());
+            self.group_sets.push((start, self.set_names.len() as u32));
             self.group_sets.len() as u32 - 1
         });
+        let (start_name, end_name) = self.group_sets[groups as usize];
+        current.triangles.charge(count - 2)?;
+        current.named.charge((count - 2) * (end_name - start_name) as usize)?;
         let corners = (start as u32, self.corners.len() as u32);
         self.faces.push(Face { corners, line: line as u32, groups });
         Ok(())
     }
 
-    fn name(&mut self, name: &str, current: &mut Current) -> usize {
+    /// Returns the index of a name, after adding it if it is new.
+    fn name(&mut self, name: &str, current: &mut Current) -> Result<u32, String> {
         if let Some(&known) = current.known.get(name) {
-            return known;
+            return Ok(known);
+        }
+        let index = self.names.len();
+        if index == MOST_FILE_NAMES {
+            return Err(format!("a file has at most {MOST_FILE_NAMES} names of groups, objects and materials"));
         }
         self.names.push(name.to_owned());
-        current.known.insert(name.to_owned(), self.names.len() - 1);
-        self.names.len() - 1
+        current.known.insert(name.to_owned(), index as u32);
+        Ok(index as u32)
+    }
+
+    /// Returns the memory in which lists would have grown.
+    fn shrink(&mut self) {
+        self.vertices.shrink_to_fit();
+        self.vertex_lines.shrink_to_fit();
+        self.uvs.shrink_to_fit();
+        self.faces.shrink_to_fit();
+        self.corners.shrink_to_fit();
+        self.group_sets.shrink_to_fit();
+        self.set_names.shrink_to_fit();
     }
 
     /// Parses `vertex`, `vertex/uv`, `vertex//normal` or `vertex/uv/normal`.
