@@ -117,6 +117,7 @@ struct Malformed {
 }
 
 /// The groups, object and material of the following faces, and what the file may still have.
+#[derive(Default)]
 struct Current {
     groups: Vec<u32>,
     object: Option<u32>,
@@ -125,46 +126,11 @@ struct Current {
     set: Option<u32>,
     /// Index of each name.
     known: BTreeMap<String, u32>,
-    triangles: Quota,
-    /// Triangles, each as often as it has names.
-    named: Quota,
-}
-
-/// A number of triangles that a file may have. Polygons of short numbers would have one for every two bytes, and
-/// programs take a hundred bytes for each.
-struct Quota {
-    most: usize,
-    left: usize,
-    what: &'static str,
-}
-
-impl Quota {
-    fn new(most: usize, what: &'static str) -> Self {
-        Self { most, left: most, what }
-    }
-
-    fn charge(&mut self, count: usize) -> Result<(), String> {
-        let Self { most, what, .. } = *self;
-        let left = self.left.checked_sub(count);
-        self.left =
-            left.ok_or_else(|| format!("a file of this size has at most {most} {what}; are faces repeated?"))?;
-        Ok(())
-    }
-}
-
-impl Current {
-    /// Begins a file of this size, in bytes.
-    fn new(size: usize) -> Self {
-        Self {
-            groups: Vec::new(),
-            object: None,
-            material: None,
-            set: None,
-            known: BTreeMap::new(),
-            triangles: Quota::new(1_000_000 + size / 16, "triangles"),
-            named: Quota::new(2_000_000 + size / 6, "triangles, counted in each of their groups"),
-        }
-    }
+    /// Number of triangles that the file may still have. Polygons of short numbers would have one for every two bytes,
+    /// and programs take a hundred bytes for each.
+    triangles: usize,
+    /// Number of triangles that it may still have in groups, each counted as often as it has names.
+    named: usize,
 }
 
 impl ObjFile {
@@ -219,7 +185,8 @@ impl ObjFile {
     }
 
     fn parse_lines(text: &str) -> Result<Self, Malformed> {
-        let (mut file, mut current) = (Self::default(), Current::new(text.len()));
+        let (triangles, named) = (1_000_000 + text.len() / 16, 2_000_000 + text.len() / 6);
+        let (mut file, mut current) = (Self::default(), Current { triangles, named, ..Current::default() });
         let malformed = |line: usize, text: &str, reason: String| {
             let text = excerpt(text.trim()).into_owned();
             Malformed { line, reason, text }
@@ -297,8 +264,9 @@ impl ObjFile {
             self.group_sets.len() as u32 - 1
         });
         let (start_name, end_name) = self.group_sets[groups as usize];
-        current.triangles.charge(count - 2)?;
-        current.named.charge((count - 2) * (end_name - start_name) as usize)?;
+        let named = (count - 2) * (end_name - start_name) as usize;
+        charge(&mut current.triangles, count - 2, "1,000,000 triangles and one for every 16 bytes")?;
+        charge(&mut current.named, named, "2,000,000 triangles in groups and one for every 6 bytes")?;
         let corners = (start as u32, self.corners.len() as u32);
         self.faces.push(Face { corners, line: line as u32, groups });
         Ok(())
@@ -357,6 +325,12 @@ impl ObjFile {
     }
 }
 
+/// Takes triangles from those that are left.
+fn charge(left: &mut usize, count: usize, most: &str) -> Result<(), String> {
+    *left = left.checked_sub(count).ok_or_else(|| format!("a file has at most {most}; are faces repeated?"))?;
+    Ok(())
+}
+
 /// Parses an index: from 1, or from −1 backwards among the `count` before the line. Returns it from 0.
 fn index(field: &str, count: usize) -> Result<u32, String> {
     let number: i64 = field.parse().map_err(|_| format!("expected a whole number, got `{}`", excerpt(field)))?;
@@ -410,6 +384,17 @@ mod tests {
         }
         let file = ObjFile::parse("vt -1e9 0.5\nvt 3\n", Path::new("a.obj")).unwrap();
         assert_eq!(file.uvs, [[-1e9, 0.5], [3.0, 0.0]]);
+    }
+
+    #[test]
+    fn triangles_and_names_are_limited_by_the_size_of_the_file() {
+        let fan = format!("f {}\n", "1 2 3 ".repeat(20_000)).repeat(20);
+        let error = message(&format!("v 0 0 0\nv 1 0 0\nv 0 1 0\n{fan}"));
+        assert!(error.contains("at most 1,000,000 triangles and one for every 16 bytes"), "{error}");
+        let error = message(&format!("g a b c d\nv 0 0 0\nv 1 0 0\nv 0 1 0\n{fan}"));
+        assert!(error.contains("at most 2,000,000 triangles in groups"), "{error}");
+        let names: String = (0..=MOST_FILE_NAMES).map(|name| format!("o {name}\n")).collect();
+        assert!(message(&names).contains("a.obj:262145: a file has at most 262144 names"), "{}", message(&names));
     }
 
     #[test]
