@@ -265,7 +265,8 @@ impl<'a> Accessors<'a> {
     }
 }
 
-/// Compares the smallest and the largest values with those that the accessor states: bytes at a wrong place have others.
+/// Compares the smallest and the largest values with those that the accessor states: bytes at a wrong place have
+/// others.
 fn check_bounds<const N: usize>(accessor: &Accessor, values: &Values<'_, N>) -> Result<(), String> {
     let stated = |bound: &Option<gltf_json::Value>| -> Option<[f64; N]> {
         let list: Vec<f64> = bound.as_ref()?.as_array()?.iter().filter_map(gltf_json::Value::as_f64).collect();

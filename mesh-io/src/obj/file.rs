@@ -185,7 +185,7 @@ impl ObjFile {
     }
 
     fn parse_lines(text: &str) -> Result<Self, Malformed> {
-        let (triangles, named) = (1_000_000 + text.len() / 16, 2_000_000 + text.len() / 6);
+        let (triangles, named) = (1_000_000 + text.len() / 16, 2_000_000 + text.len() / 4);
         let (mut file, mut current) = (Self::default(), Current { triangles, named, ..Current::default() });
         let malformed = |line: usize, text: &str, reason: String| {
             let text = excerpt(text.trim()).into_owned();
@@ -194,8 +194,6 @@ impl ObjFile {
         for (line, text) in lines::logical(text) {
             file.add(line, &text, &mut current).map_err(|reason| malformed(line, &text, reason))?;
         }
-        drop(current);
-        file.shrink();
         let broken = file.faces.iter().find_map(|face| Some((face.line(), file.missing(*face)?)));
         let Some((line, reason)) = broken else { return Ok(file) };
         let text = lines::logical(text).find(|(number, _)| *number == line);
@@ -266,7 +264,7 @@ impl ObjFile {
         let (start_name, end_name) = self.group_sets[groups as usize];
         let named = (count - 2) * (end_name - start_name) as usize;
         charge(&mut current.triangles, count - 2, "1,000,000 triangles and one for every 16 bytes")?;
-        charge(&mut current.named, named, "2,000,000 triangles in groups and one for every 6 bytes")?;
+        charge(&mut current.named, named, "2,000,000 triangles in groups and one for every 4 bytes")?;
         let corners = (start as u32, self.corners.len() as u32);
         self.faces.push(Face { corners, line: line as u32, groups });
         Ok(())
@@ -284,17 +282,6 @@ impl ObjFile {
         self.names.push(name.to_owned());
         current.known.insert(name.to_owned(), index as u32);
         Ok(index as u32)
-    }
-
-    /// Returns the memory in which lists would have grown.
-    fn shrink(&mut self) {
-        self.vertices.shrink_to_fit();
-        self.vertex_lines.shrink_to_fit();
-        self.uvs.shrink_to_fit();
-        self.faces.shrink_to_fit();
-        self.corners.shrink_to_fit();
-        self.group_sets.shrink_to_fit();
-        self.set_names.shrink_to_fit();
     }
 
     /// Parses `vertex`, `vertex/uv`, `vertex//normal` or `vertex/uv/normal`.

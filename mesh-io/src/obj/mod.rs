@@ -4,8 +4,8 @@
 //! readers decide which faces they need and what a valid mesh is.
 //!
 //! A file may come from a stranger. It is a regular file of at most [`LARGEST_FILE`] bytes. A face has at most
-//! [`MOST_CORNERS`] corners and [`MOST_NAMES`] groups, a file [`MOST_FILE_NAMES`] names. A file of `n` bytes has at most
-//! 1,000,000 + n/16 triangles; counted in each of their groups, 2,000,000 + n/6.
+//! [`MOST_CORNERS`] corners and [`MOST_NAMES`] groups, a file [`MOST_FILE_NAMES`] names. A file of n bytes has at most
+//! 1,000,000 + n/16 triangles; counted in each of their groups, 2,000,000 + n/4.
 
 mod file;
 mod lines;

@@ -7,8 +7,8 @@ use super::track::{Joined, Track};
 use super::vertex_normals;
 use crate::mesh::SplitMesh;
 
-/// Encodes an animation as a binary glTF 2.0 file (`.glb`), as [`mesh_io::animation::animation_glb`] does. The first frame
-/// is at 0 s. glTF's y axis points up: (x, y, z) becomes (x, z, −y).
+/// Encodes an animation as a binary glTF 2.0 file (`.glb`), as [`mesh_io::animation::animation_glb`] does. The first
+/// frame is at 0 s. glTF's y axis points up: (x, y, z) becomes (x, z, −y).
 ///
 /// # Errors
 /// Returns an error if the file would be too large or its JSON part cannot be written.
