@@ -86,6 +86,13 @@ fn repeated(lines: &str, size: usize) -> Vec<u8> {
     format!("{TRIANGLE}{}f 1 2 3\n", lines.repeat(size / lines.len())).into_bytes()
 }
 
+/// Returns polygons of many triangles, none of which is degenerate: the most triangles for its size.
+fn fans(size: usize) -> Vec<u8> {
+    let vertices: String = (0..9).map(|i| format!("v {i} {} 0\n", i * i)).collect();
+    let fan = format!("f 1{}\n", " 2 3 4 5 6 7 8 9".repeat(8_000));
+    format!("{vertices}{}", fan.repeat(size / fan.len())).into_bytes()
+}
+
 /// Returns a grid of squares with short coordinates, each a valid pair of triangles, in this many groups.
 fn grid(side: usize, groups: usize) -> Vec<u8> {
     let names: String = (0..groups).map(|group| format!(" g{group}")).collect();
@@ -121,7 +128,7 @@ fn obj_files() {
     check("names", format!("{TRIANGLE}{names}\nf 1 2 3\n").as_bytes(), &OBJ_READERS);
     check("a grid", &grid(400, 1), &OBJ_READERS);
     // Here, the summand is a small part of the bound.
-    check("30 MB of fans", &repeated(&fan, 30_000_000), &["cloth", "body"]);
+    check("30 MB of fans", &fans(30_000_000), &["cloth", "welded", "body"]);
     check("40 MB of vertices", &repeated("v 0 0 0\n", 40_000_000), &["cloth", "welded", "body"]);
     check("40 MB of a grid", &grid(1_000, 3), &["cloth", "body"]);
 }
@@ -206,6 +213,9 @@ fn gltf_descriptions() {
     let bound = r#""accessors":[{"componentType":5126,"count":1,"type":"VEC3","min":["#;
     for value in ["0", "[]", "[0]", "{}", r#"{"a":0}"#, r#"{"a":[0]}"#, r#""a""#, "[[[[[[0]]]]]]"] {
         check(&format!("bounds {value}"), &filled(bound, value, "]}]"), &["glTF"]);
+        let values = vec![value; (LARGEST_DESCRIPTION - 1_000) / (value.len() + 1)].join(",");
+        let whole = container(&format!(r#"{{"asset":{{"version":"2.0"}},{bound}{values}]}}]}}"#), &[0; 4]);
+        check(&format!("16 MiB of bounds {value}"), &whole, &["glTF"]);
     }
     let mut random = Rng::with_seed(2);
     for number in 0..10 {
