@@ -1,7 +1,7 @@
 //! A track as an animation in binary glTF.
 
-pub use mesh_animation::AnimationError;
-use mesh_animation::{AnimatedMesh, Axes, Elements, Shape, animation_glb};
+pub use mesh_io::animation::AnimationError;
+use mesh_io::animation::{AnimatedMesh, Axes, Elements, Shape, animation_glb};
 use nalgebra::Vector3;
 
 use crate::body::vertex_normals;

@@ -1,6 +1,6 @@
 //! A track as Universal Scene Description, in its text format (`.usda`).
 
-use std::io::{BufWriter, Result, Write};
+use std::io::{BufWriter, Result};
 use std::path::Path;
 
 use energy_files::PartFile;
@@ -8,35 +8,36 @@ use nalgebra::Vector3;
 
 /// Writes a mesh whose points move, frame by frame. The file appears when it is complete.
 #[derive(Debug)]
-pub struct UsdWriter {
-    file: BufWriter<PartFile>,
-}
+pub struct UsdWriter(mesh_io::usd::UsdWriter<BufWriter<PartFile>>);
 
 impl UsdWriter {
-    /// Begins a file. `times` has the time code of each frame, in frames from the first one. Points are in the camera's
-    /// coordinates (x right, y down, z forwards, m); a rotation by 180° about x shows them with y up, seen by a USD
-    /// camera at the origin.
+    /// Begins a file. `last` is the time code of the last frame, in frames from the first one. Points are in the
+    /// camera's coordinates (x right, y down, z forwards, m); a rotation by 180° about x shows them with y up, seen by
+    /// a USD camera at the origin.
     ///
     /// # Errors
     /// If the file cannot be written.
     pub fn create(path: &Path, triangles: &[[u32; 3]], frames_per_second: f64, last: f64) -> Result<Self> {
-        let mut file = BufWriter::new(PartFile::create(path)?);
-        write!(
-            file,
-            "#usda 1.0\n(\n    defaultPrim = \"Track\"\n    \
-             doc = \"Points in the depth camera's coordinates: x right, y down, z forwards, in metres.\"\n    \
-             endTimeCode = {last}\n    framesPerSecond = {frames_per_second}\n    metersPerUnit = 1\n    \
-             startTimeCode = 0\n    timeCodesPerSecond = {frames_per_second}\n    upAxis = \"Y\"\n)\n\n\
-             def Xform \"Track\"\n{{\n    double xformOp:rotateX = 180\n    \
-             uniform token[] xformOpOrder = [\"xformOp:rotateX\"]\n\n    \
-             def Mesh \"Body\"\n    {{\n        uniform token subdivisionScheme = \"none\"\n        \
-             int[] faceVertexCounts = ["
-        )?;
-        list(&mut file, triangles, |file, _| write!(file, "3"))?;
-        write!(file, "]\n        int[] faceVertexIndices = [")?;
-        list(&mut file, triangles, |file, [a, b, c]| write!(file, "{a}, {b}, {c}"))?;
-        write!(file, "]\n        point3f[] points.timeSamples = {{\n")?;
-        Ok(Self { file })
+        let metadata: [(&str, &dyn std::fmt::Display); 8] = [
+            ("defaultPrim", &"\"Track\""),
+            ("doc", &"\"Points in the depth camera's coordinates: x right, y down, z forwards, in metres.\""),
+            ("endTimeCode", &last),
+            ("framesPerSecond", &frames_per_second),
+            ("metersPerUnit", &1),
+            ("startTimeCode", &0),
+            ("timeCodesPerSecond", &frames_per_second),
+            ("upAxis", &"\"Y\""),
+        ];
+        let mut usd = mesh_io::usd::UsdWriter::new(BufWriter::new(PartFile::create(path)?), &metadata)?;
+        usd.begin(format_args!("def Xform \"Track\""))?;
+        usd.line(format_args!("double xformOp:rotateX = 180"))?;
+        usd.line(format_args!("uniform token[] xformOpOrder = [\"xformOp:rotateX\"]\n"))?;
+        usd.begin(format_args!("def Mesh \"Body\""))?;
+        usd.line(format_args!("uniform token subdivisionScheme = \"none\""))?;
+        usd.list("int[] faceVertexCounts", triangles.iter().map(|_| 3), "")?;
+        usd.list("int[] faceVertexIndices", triangles.as_flattened(), "")?;
+        usd.begin_samples("point3f[] points", "")?;
+        Ok(Self(usd))
     }
 
     /// Adds the points of a frame at a time code, with micrometre precision.
@@ -44,34 +45,16 @@ impl UsdWriter {
     /// # Errors
     /// If the file cannot be written.
     pub fn frame(&mut self, time: f64, points: &[Vector3<f64>]) -> Result<()> {
-        write!(self.file, "            {time}: [")?;
-        list(&mut self.file, points, |file, p| write!(file, "({:.6}, {:.6}, {:.6})", p.x, p.y, p.z))?;
-        writeln!(self.file, "],")
+        self.0.sample(time, points.iter().map(|p| format!("({:.6}, {:.6}, {:.6})", p.x, p.y, p.z)))
     }
 
     /// Completes the file.
     ///
     /// # Errors
     /// If the file cannot be written.
-    pub fn finish(mut self) -> Result<()> {
-        write!(self.file, "        }}\n    }}\n}}\n")?;
-        self.file.into_inner()?.finish()
+    pub fn finish(self) -> Result<()> {
+        self.0.finish()?.into_inner()?.finish()
     }
-}
-
-/// Writes the entries of a list, separated by commas.
-fn list<T>(
-    file: &mut BufWriter<PartFile>,
-    entries: &[T],
-    mut write: impl FnMut(&mut BufWriter<PartFile>, &T) -> Result<()>,
-) -> Result<()> {
-    for (at, entry) in entries.iter().enumerate() {
-        if at > 0 {
-            file.write_all(b", ")?;
-        }
-        write(file, entry)?;
-    }
-    Ok(())
 }
 
 #[cfg(test)]

@@ -1,14 +1,14 @@
 use std::ops::Range;
 
 use energy_dsl::Vector3;
-use mesh_animation::{AnimatedMesh, AnimationError, Axes, Elements, Shape, animation_glb as meshes_glb};
+use mesh_io::animation::{AnimatedMesh, AnimationError, Axes, Elements, Shape, animation_glb as meshes_glb};
 
 use super::track::{Joined, Track};
 use super::vertex_normals;
 use crate::mesh::SplitMesh;
 
-/// Encodes an animation as a binary glTF 2.0 file (`.glb`), as [`mesh_animation::animation_glb`] does. The first frame
-/// is at 0 s. glTF's y axis points up: (x, y, z) becomes (x, z, −y).
+/// Encodes an animation as a binary glTF 2.0 file (`.glb`), as [`mesh_io::animation::animation_glb`] does. The first
+/// frame is at 0 s. glTF's y axis points up: (x, y, z) becomes (x, z, −y).
 ///
 /// # Errors
 /// Returns an error if the file would be too large or its JSON part cannot be written.

@@ -3,7 +3,6 @@
 mod animation;
 mod floor_shadow;
 mod folder;
-mod frame;
 mod picture;
 mod ply;
 mod point_cache;
@@ -19,8 +18,7 @@ mod visibility;
 
 pub use animation::animation_glb;
 pub use folder::{OutputError, OutputFolder};
-pub use frame::{last_obj_line, obj_text};
-pub use mesh_animation::AnimationError;
+pub use mesh_io::animation::AnimationError;
 pub use picture::{Look, PictureError, View, picture_png};
 pub use ply::ply_bytes;
 pub use point_cache::{mdd_bytes, pc2_bytes};

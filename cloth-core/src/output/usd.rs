@@ -1,6 +1,8 @@
-use std::fmt::Write as _;
+use std::fmt::Display;
+use std::io::Result;
 
 use energy_dsl::Vector3;
+use mesh_io::usd::UsdWriter;
 
 use super::track::{Joined, Track};
 use super::vertex_normals;
@@ -9,157 +11,133 @@ use super::vertex_normals;
 /// frame, and a material for each. Lengths are in m, z is up, and frame n has time code n.
 #[must_use]
 pub fn usd_text(tracks: &[Track<'_>], frames_per_second: f64) -> String {
+    let text = usd_bytes(tracks, frames_per_second).expect("writing to memory succeeds");
+    String::from_utf8(text).expect("names are identifiers")
+}
+
+fn usd_bytes(tracks: &[Track<'_>], frames_per_second: f64) -> Result<Vec<u8>> {
     let frames = tracks.iter().map(|track| track.frames.len()).max().unwrap_or(1);
-    let mut file = Usd { text: String::new(), names: Vec::new() };
-    file.line(format_args!("#usda 1.0\n(\n    defaultPrim = \"scene\"\n    metersPerUnit = 1\n    upAxis = \"Z\""));
-    file.line(format_args!("    startTimeCode = 0\n    endTimeCode = {}", frames.saturating_sub(1)));
-    file.line(format_args!(
-        "    timeCodesPerSecond = {frames_per_second}\n    framesPerSecond = {frames_per_second}\n)\n"
-    ));
-    file.line(format_args!("def Xform \"scene\"\n{{"));
-    tracks.iter().for_each(|track| file.add(track));
-    file.add_materials(tracks);
-    file.line(format_args!("}}"));
-    file.text
+    let metadata: [(&str, &dyn Display); 7] = [
+        ("defaultPrim", &"\"scene\""),
+        ("metersPerUnit", &1),
+        ("upAxis", &"\"Z\""),
+        ("startTimeCode", &0),
+        ("endTimeCode", &frames.saturating_sub(1)),
+        ("timeCodesPerSecond", &frames_per_second),
+        ("framesPerSecond", &frames_per_second),
+    ];
+    let mut usd = Usd { text: UsdWriter::new(Vec::new(), &metadata)?, names: Vec::new() };
+    usd.text.begin(format_args!("def Xform \"scene\""))?;
+    tracks.iter().try_for_each(|track| usd.add(track))?;
+    usd.add_materials(tracks)?;
+    usd.text.finish()
 }
 
 struct Usd {
-    text: String,
+    text: UsdWriter<Vec<u8>>,
+    /// Names of the tracks so far.
     names: Vec<String>,
 }
 
 impl Usd {
-    fn line(&mut self, arguments: std::fmt::Arguments<'_>) {
-        self.text.write_fmt(arguments).expect("writing to a string succeeds");
-        self.text.push('\n');
-    }
-
-    fn add(&mut self, track: &Track<'_>) {
+    fn add(&mut self, track: &Track<'_>) -> Result<()> {
         let name = self.identifier(track.name);
         let [red, green, blue] = track.colour;
         let bound = "(\n        prepend apiSchemas = [\"MaterialBindingAPI\"]\n    )";
         match track.joined {
             Joined::Triangles(triangles) => {
-                self.line(format_args!("    def Mesh \"{name}\" {bound}\n    {{"));
-                self.line(format_args!(
-                    "        uniform token subdivisionScheme = \"none\"\n        uniform bool doubleSided = 1"
-                ));
-                let counts = vec!["3"; triangles.len()].join(", ");
-                self.line(format_args!("        int[] faceVertexCounts = [{counts}]"));
-                let corners: Vec<String> = triangles.iter().flatten().map(usize::to_string).collect();
-                self.line(format_args!("        int[] faceVertexIndices = [{}]", corners.join(", ")));
-                self.corner_attributes(track, triangles);
-                if track.corners.normals.is_none() {
-                    self.vertex_normals(track, triangles);
-                }
+                self.text.begin(format_args!("def Mesh \"{name}\" {bound}"))?;
+                self.text.line(format_args!("uniform token subdivisionScheme = \"none\""))?;
+                self.text.line(format_args!("uniform bool doubleSided = 1"))?;
+                self.text.list("int[] faceVertexCounts", triangles.iter().map(|_| 3), "")?;
+                self.text.list("int[] faceVertexIndices", triangles.as_flattened(), "")?;
+                self.corner_attributes(track, triangles)?;
             }
             Joined::Strands(strands) => {
-                self.line(format_args!("    def BasisCurves \"{name}\" {bound}\n    {{"));
-                self.line(format_args!("        uniform token type = \"linear\""));
-                let counts: Vec<String> = strands.iter().map(|strand| strand.len().to_string()).collect();
-                self.line(format_args!("        int[] curveVertexCounts = [{}]", counts.join(", ")));
-                self.line(format_args!(
-                    "        float[] widths = [{}] (\n            interpolation = \"constant\"\n        )",
-                    track.width as f32
-                ));
+                self.text.begin(format_args!("def BasisCurves \"{name}\" {bound}"))?;
+                self.text.line(format_args!("uniform token type = \"linear\""))?;
+                self.text.list("int[] curveVertexCounts", strands.iter().map(ExactSizeIterator::len), "")?;
+                self.text.list("float[] widths", [track.width as f32], "constant")?;
             }
         }
-        self.line(format_args!("        color3f[] primvars:displayColor = [({red}, {green}, {blue})]"));
-        self.line(format_args!("        rel material:binding = </scene/materials/{name}>"));
-        self.points(&track.frames);
+        self.text.line(format_args!("color3f[] primvars:displayColor = [({red}, {green}, {blue})]"))?;
+        self.text.line(format_args!("rel material:binding = </scene/materials/{name}>"))?;
+        self.points(&track.frames)?;
         if !track.velocities.is_empty() {
-            self.samples("vector3f[] velocities", "", &track.velocities, &tuples);
+            self.samples("vector3f[] velocities", "", &track.velocities, <[_]>::to_vec)?;
         }
         if !track.contact_forces.is_empty() {
-            let at_vertices = "(\n            interpolation = \"vertex\"\n        )";
-            self.samples("vector3f[] primvars:contactForce", at_vertices, &track.contact_forces, &tuples);
+            self.samples("vector3f[] primvars:contactForce", "vertex", &track.contact_forces, <[_]>::to_vec)?;
         }
-        self.line(format_args!("    }}"));
+        self.text.end()
     }
 
     /// Adds a material for each track, as previews show it.
-    fn add_materials(&mut self, tracks: &[Track<'_>]) {
-        self.line(format_args!("    def Scope \"materials\"\n    {{"));
-        let names = std::mem::take(&mut self.names);
+    fn add_materials(&mut self, tracks: &[Track<'_>]) -> Result<()> {
+        let Self { text, names } = self;
+        text.begin(format_args!("def Scope \"materials\""))?;
         for (name, track) in names.iter().zip(tracks) {
             let [red, green, blue] = track.colour;
-            let surface = format!("/scene/materials/{name}/surface");
-            self.line(format_args!("        def Material \"{name}\"\n        {{"));
-            self.line(format_args!("            token outputs:surface.connect = <{surface}.outputs:surface>\n"));
-            self.line(format_args!("            def Shader \"surface\"\n            {{"));
-            self.line(format_args!("                uniform token info:id = \"UsdPreviewSurface\""));
-            self.line(format_args!("                color3f inputs:diffuseColor = ({red}, {green}, {blue})"));
-            self.line(format_args!(
-                "                float inputs:metallic = 0\n                float inputs:roughness = 0.85"
-            ));
-            self.line(format_args!("                token outputs:surface\n            }}\n        }}"));
+            text.begin(format_args!("def Material \"{name}\""))?;
+            let output = format!("/scene/materials/{name}/surface.outputs:surface");
+            text.line(format_args!("token outputs:surface.connect = <{output}>\n"))?;
+            text.begin(format_args!("def Shader \"surface\""))?;
+            text.line(format_args!("uniform token info:id = \"UsdPreviewSurface\""))?;
+            text.line(format_args!("color3f inputs:diffuseColor = ({red}, {green}, {blue})"))?;
+            text.line(format_args!("float inputs:metallic = 0"))?;
+            text.line(format_args!("float inputs:roughness = 0.85"))?;
+            text.line(format_args!("token outputs:surface"))?;
+            text.end()?;
+            text.end()?;
         }
-        self.line(format_args!("    }}"));
+        text.end()
     }
 
-    /// Adds smooth normals at the vertices.
-    fn vertex_normals(&mut self, track: &Track<'_>, triangles: &[[usize; 3]]) {
-        let normals = |frame: &[Vector3<f64>]| tuples(&vertex_normals(frame, triangles));
-        let interpolation = "(\n            interpolation = \"vertex\"\n        )";
-        match &track.frames[..] {
-            [only] => self.line(format_args!("        normal3f[] normals = [{}] {interpolation}", normals(only))),
-            frames => self.samples("normal3f[] normals", interpolation, frames, &normals),
-        }
-    }
-
-    /// Adds an attribute with a value per frame.
+    /// Adds an attribute with vectors per frame.
     fn samples(
         &mut self,
         attribute: &str,
-        metadata: &str,
+        interpolation: &str,
         frames: &[&[Vector3<f64>]],
-        values: &dyn Fn(&[Vector3<f64>]) -> String,
-    ) {
-        if !metadata.is_empty() {
-            self.line(format_args!("        {attribute} {metadata}"));
-        }
-        self.line(format_args!("        {attribute}.timeSamples = {{"));
+        vectors: impl Fn(&[Vector3<f64>]) -> Vec<Vector3<f64>>,
+    ) -> Result<()> {
+        self.text.begin_samples(attribute, interpolation)?;
         for (number, frame) in frames.iter().enumerate() {
-            self.line(format_args!("            {number}: [{}],", values(frame)));
+            self.text.sample(number, tuples(&vectors(frame)))?;
         }
-        self.line(format_args!("        }}"));
+        self.text.end()
     }
 
-    /// Adds texture coordinates and normals of the corners of triangles, if a file gave them.
-    fn corner_attributes(&mut self, track: &Track<'_>, triangles: &[[usize; 3]]) {
-        let varying = "(\n            interpolation = \"faceVarying\"\n        )";
+    /// Adds texture coordinates and normals of the corners of triangles if a file gave them, else smooth normals at the
+    /// vertices.
+    fn corner_attributes(&mut self, track: &Track<'_>, triangles: &[[usize; 3]]) -> Result<()> {
+        let (name, frames) = ("normal3f[] normals", &track.frames);
         if let Some(uvs) = &track.corners.uvs {
-            let uvs: Vec<String> =
-                uvs.iter().flatten().map(|[u, v]| format!("({}, {})", *u as f32, *v as f32)).collect();
-            self.line(format_args!("        texCoord2f[] primvars:st = [{}] {varying}", uvs.join(", ")));
+            let uvs = uvs.as_flattened().iter().map(|[u, v]| format!("({}, {})", *u as f32, *v as f32));
+            self.text.list("texCoord2f[] primvars:st", uvs, "faceVarying")?;
         }
         if track.corners.normals.is_some() {
             let split = track.corners.split(triangles);
             let normals = |frame: &[Vector3<f64>]| {
                 let normals = split.normals(frame);
-                tuples(&split.triangles.iter().flatten().map(|&corner| normals[corner]).collect::<Vec<_>>())
+                split.triangles.as_flattened().iter().map(|&corner| normals[corner]).collect()
             };
-            self.samples("normal3f[] normals", varying, &track.frames, &normals);
+            return self.samples(name, "faceVarying", frames, normals);
+        }
+        match &frames[..] {
+            [only] => self.text.list(name, tuples(&vertex_normals(only, triangles)), "vertex"),
+            frames => self.samples(name, "vertex", frames, |frame| vertex_normals(frame, triangles)),
         }
     }
 
-    fn points(&mut self, frames: &[&[Vector3<f64>]]) {
-        let bounds = |points: &[Vector3<f64>]| {
-            let bound = |pick: fn(f64, f64) -> f64, start: f64| -> Vector3<f64> {
-                std::array::from_fn(|axis| points.iter().map(|p| p[axis]).fold(start, pick))
-            };
-            tuples(&[bound(f64::min, f64::INFINITY), bound(f64::max, f64::NEG_INFINITY)])
-        };
+    fn points(&mut self, frames: &[&[Vector3<f64>]]) -> Result<()> {
+        let (extent, points) = ("float3[] extent", "point3f[] points");
         if let [only] = frames {
-            self.line(format_args!("        float3[] extent = [{}]", bounds(only)));
-            self.line(format_args!("        point3f[] points = [{}]", tuples(only)));
-            return;
+            self.text.list(extent, tuples(&bounds(only)), "")?;
+            return self.text.list(points, tuples(only), "");
         }
-        for (attribute, values) in
-            [("float3[] extent", &bounds as &dyn Fn(&[Vector3<f64>]) -> String), ("point3f[] points", &tuples)]
-        {
-            self.samples(attribute, "", frames, values);
-        }
+        self.samples(extent, "", frames, bounds)?;
+        self.samples(points, "", frames, <[_]>::to_vec)
     }
 
     /// Returns a unique USD identifier: letters, digits and underscores, not starting with a digit.
@@ -177,10 +155,17 @@ impl Usd {
     }
 }
 
+/// Returns the smallest and the largest coordinates of points.
+fn bounds(points: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
+    let bound = |pick: fn(f64, f64) -> f64, start: f64| -> Vector3<f64> {
+        std::array::from_fn(|axis| points.iter().map(|p| p[axis]).fold(start, pick))
+    };
+    vec![bound(f64::min, f64::INFINITY), bound(f64::max, f64::NEG_INFINITY)]
+}
+
 /// Formats points with the digits of single precision, the type of points in USD.
-fn tuples(points: &[Vector3<f64>]) -> String {
-    let one = |p: &Vector3<f64>| format!("({}, {}, {})", p[0] as f32, p[1] as f32, p[2] as f32);
-    points.iter().map(one).collect::<Vec<_>>().join(", ")
+fn tuples(points: &[Vector3<f64>]) -> impl Iterator<Item = String> {
+    points.iter().map(|p| format!("({}, {}, {})", p[0] as f32, p[1] as f32, p[2] as f32))
 }
 
 #[cfg(test)]

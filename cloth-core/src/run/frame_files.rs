@@ -5,10 +5,11 @@ use std::io::{Read, Seek, SeekFrom};
 use std::path::Path;
 
 use energy_dsl::Vector3;
+use mesh_io::obj::{ObjMesh, last_obj_line, obj_text};
 
 use super::frame_store::Vectors;
 use super::{Run, RunError};
-use crate::output::{last_obj_line, obj_text, ply_bytes};
+use crate::output::{ply_bytes, vertex_normals};
 
 impl Run {
     /// Writes the files of a frame. A resumed run writes only those that are missing or truncated.
@@ -22,7 +23,9 @@ impl Run {
         let (simulation, wanted) = (&self.simulation, &self.scene.output);
         let mut written = 0;
         if wanted.obj && !(only_broken && self.has_whole_obj(number)) {
-            let text = obj_text(x, simulation.triangles(), simulation.strands());
+            let (triangles, strands) = (simulation.triangles(), simulation.strands());
+            let normals = vertex_normals(x, triangles);
+            let text = obj_text(&ObjMesh { positions: x, digits: 9, normals: Some(&normals), triangles, strands });
             self.folder.write_frame(number, "obj", text.as_bytes())?;
             written += 1;
         }
@@ -36,7 +39,7 @@ impl Run {
 
     /// Whether the OBJ file of a frame exists and ends as it should. Formatting all frames again would take long.
     fn has_whole_obj(&self, number: usize) -> bool {
-        let end = last_obj_line(self.simulation.triangles(), self.simulation.strands());
+        let end = last_obj_line(self.simulation.triangles(), self.simulation.strands(), true);
         ends_with(&self.folder.frame_path(number, "obj"), end.as_bytes()).unwrap_or(false)
     }
 }

@@ -1,12 +1,11 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use gltf::json::mesh::{Mode, Primitive, Semantic};
-use gltf::json::validation::Checked;
+use mesh_io::gltf::json::mesh::{Mode, Primitive, Semantic};
+use mesh_io::gltf::json::validation::Checked;
+use mesh_io::gltf::{Accessors, Container, Fault, Usage, Values};
 use nalgebra::Vector3;
 
-use super::accessor::{Accessors, Usage};
-use super::glb::{Container, Fault};
 use super::mesh::Mesh;
 use super::skin::SkinBones;
 use super::skinned::{BodyError, SkinnedBody};
@@ -49,7 +48,7 @@ pub enum GltfError {
 /// bind matrices give the joints' positions at rest. A bone's tail is the mean of its children's heads, or its own head
 /// without children.
 ///
-/// Everything that the file says about its data is checked before it is used. Memory is at most 20 times the file, and
+/// Everything that the file says about its data is checked before it is used. Memory is at most 20 times the file and
 /// 300 MB.
 ///
 /// # Errors
@@ -127,25 +126,25 @@ impl Surface {
             _ => return Ok(()),
         }
         let (first, count) = self.vertices_of(primitive, order, accessors)?;
-        let corners: Vec<u32> = match primitive.indices {
-            Some(indices) => {
-                let read: Vec<[f64; 1]> = accessors.read(indices.value(), &Usage::INDICES)?;
-                read.into_iter().map(|[index]| index as u32).collect()
-            }
-            None => {
-                accessors.charge(count as u64).map_err(|reason| Fault::new("its corners", reason))?;
-                (0..count as u32).collect()
-            }
-        };
         let fault = |reason| Fault::new("its corners", reason);
-        if let Some(index) = corners.iter().find(|&&index| index as usize >= count) {
+        let Some(indices) = primitive.indices else {
+            accessors.charge(count as u64).map_err(fault)?;
+            return self.add_triangles(count, (0..count as u32).map(|corner| first + corner)).map_err(fault);
+        };
+        let indices: Values<'_, 1> = accessors.read(indices.value(), &Usage::INDICES)?;
+        let corners = || indices.iter().map(|[index]| index as u32);
+        if let Some(index) = corners().find(|&index| index as usize >= count) {
             return Err(fault(format!("one is vertex {index}, but there are only {count} vertices")));
         }
-        let (triangles, rest) = corners.as_chunks::<3>();
-        if !rest.is_empty() {
-            return Err(fault(format!("expected 3 for each triangle, got {} in all", corners.len())));
+        self.add_triangles(indices.len(), corners().map(|corner| first + corner)).map_err(fault)
+    }
+
+    fn add_triangles(&mut self, count: usize, mut corners: impl Iterator<Item = u32>) -> Result<(), String> {
+        if !count.is_multiple_of(3) {
+            return Err(format!("expected 3 for each triangle, got {count} in all"));
         }
-        self.triangles.extend(triangles.iter().map(|corners| corners.map(|corner| first + corner)));
+        let mut triangle = || Some([corners.next()?, corners.next()?, corners.next()?]);
+        self.triangles.extend(std::iter::from_fn(&mut triangle));
         Ok(())
     }
 
@@ -169,41 +168,43 @@ impl Surface {
         if let Some(known) = self.shared.get(&key) {
             return Ok(*known);
         }
-        let positions: Vec<[f64; 3]> = accessors.read(positions, &Usage::POSITIONS)?;
-        let rows = skinning_rows(&key[1..], positions.len(), order, accessors)?;
+        let positions: Values<'_, 3> = accessors.read(positions, &Usage::POSITIONS)?;
         let place = (self.vertices.len() as u32, positions.len());
-        self.vertices.extend(positions.into_iter().map(Vector3::from));
-        self.weights.extend(rows);
+        self.add_weights(&key[1..], positions.len(), order, accessors)?;
+        self.vertices.extend(positions.iter().map(Vector3::from));
         self.shared.insert(key, place);
         Ok(place)
     }
-}
 
-/// Reads the bones and weights of vertices from pairs of accessors.
-fn skinning_rows(
-    pairs: &[usize],
-    vertices: usize,
-    order: &[usize],
-    accessors: &mut Accessors<'_>,
-) -> Result<Vec<Vec<(usize, f64)>>, Fault> {
-    let mut rows = vec![Vec::new(); vertices];
-    let (pairs, _) = pairs.as_chunks::<2>();
-    for (set, &[joints, amounts]) in pairs.iter().enumerate() {
-        let fault = |reason: String| Fault::new(format!("joints and weights {set}"), reason);
-        let joints: Vec<[f64; 4]> = accessors.read(joints, &Usage::JOINTS)?;
-        let amounts: Vec<[f64; 4]> = accessors.read(amounts, &Usage::WEIGHTS)?;
-        if (joints.len(), amounts.len()) != (vertices, vertices) {
-            let found = format!("{} and {}", joints.len(), amounts.len());
-            return Err(fault(format!("expected one of each per vertex, {vertices}, got {found}")));
-        }
-        for (vertex, (joints, amounts)) in joints.iter().zip(&amounts).enumerate() {
-            for (&joint, &amount) in joints.iter().zip(amounts).filter(|(_, amount)| **amount != 0.0) {
-                let bone = order.get(joint as usize).ok_or_else(|| {
-                    fault(format!("vertex {vertex} has joint {joint}, but the skin has only {} joints", order.len()))
-                })?;
-                rows[vertex].push((*bone, amount));
+    /// Adds the bones and weights of new vertices from pairs of accessors.
+    fn add_weights(
+        &mut self,
+        pairs: &[usize],
+        vertices: usize,
+        order: &[usize],
+        accessors: &mut Accessors<'_>,
+    ) -> Result<(), Fault> {
+        let first = self.weights.len();
+        self.weights.resize_with(first + vertices, Vec::new);
+        let (pairs, _) = pairs.as_chunks::<2>();
+        for (set, &[joints, amounts]) in pairs.iter().enumerate() {
+            let fault = |reason: String| Fault::new(format!("joints and weights {set}"), reason);
+            let joints: Values<'_, 4> = accessors.read(joints, &Usage::JOINTS)?;
+            let amounts: Values<'_, 4> = accessors.read(amounts, &Usage::WEIGHTS)?;
+            if (joints.len(), amounts.len()) != (vertices, vertices) {
+                let found = format!("{} and {}", joints.len(), amounts.len());
+                return Err(fault(format!("expected one of each per vertex, {vertices}, got {found}")));
+            }
+            for (vertex, (joints, amounts)) in joints.iter().zip(amounts.iter()).enumerate() {
+                for (joint, amount) in joints.into_iter().zip(amounts).filter(|&(_, amount)| amount != 0.0) {
+                    let bone = order.get(joint as usize).ok_or_else(|| {
+                        let joints = order.len();
+                        fault(format!("vertex {vertex} has joint {joint}, but the skin has only {joints} joints"))
+                    })?;
+                    self.weights[first + vertex].push((*bone, amount));
+                }
             }
         }
+        Ok(())
     }
-    Ok(rows)
 }

@@ -1,7 +1,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use mesh_obj::{ObjFile, ObjFileError};
+use mesh_io::obj::{ObjFile, ObjFileError};
 use nalgebra::Vector3;
 use serde::Deserialize;
 
@@ -73,7 +73,11 @@ struct WeightFile {
 struct Groups {
     path: PathBuf,
     positions: Vec<Vector3<f64>>,
-    polygons: BTreeMap<String, Vec<Vec<usize>>>,
+    file: ObjFile,
+    /// The faces of each name of the file.
+    faces: Vec<Vec<u32>>,
+    /// The index of each name that has faces.
+    names: BTreeMap<String, usize>,
 }
 
 /// Metres per decimetre, the unit of the mesh.
@@ -106,24 +110,30 @@ pub fn read_makehuman(mesh: &Path, rig: &Path, weights: &Path) -> Result<Skinned
 
 impl Groups {
     fn read(path: &Path) -> Result<Self, MakeHumanError> {
-        let file = ObjFile::read(path)?;
-        let positions = file.vertices.iter().map(|&p| METRES * Vector3::from(p)).collect();
-        let mut polygons: BTreeMap<String, Vec<Vec<usize>>> = BTreeMap::new();
-        for &face in &file.faces {
-            for &group in file.groups(face) {
-                let corners = file.corners(face).iter().map(|corner| corner.vertex()).collect();
-                polygons.entry(file.names[group].clone()).or_default().push(corners);
-            }
+        let mut file = ObjFile::read(path)?;
+        let positions = std::mem::take(&mut file.vertices).into_iter().map(|p| METRES * Vector3::from(p)).collect();
+        let mut faces = vec![Vec::new(); file.names.len()];
+        for (number, &face) in file.faces.iter().enumerate() {
+            file.groups(face).iter().for_each(|&group| faces[group as usize].push(number as u32));
         }
-        Ok(Self { path: path.to_owned(), positions, polygons })
+        let names = std::mem::take(&mut file.names).into_iter().zip(0..);
+        let names = names.filter(|&(_, number): &(String, usize)| !faces[number].is_empty()).collect();
+        Ok(Self { path: path.to_owned(), positions, file, faces, names })
     }
 
-    fn group(&self, group: &str, needed_by: &str) -> Result<&[Vec<usize>], MakeHumanError> {
-        self.polygons.get(group).map(Vec::as_slice).ok_or_else(|| MakeHumanError::MissingGroup {
+    /// Returns the vertices of each face of a group.
+    fn group(&self, group: &str, needed_by: &str) -> Result<impl Iterator<Item = Vec<usize>>, MakeHumanError> {
+        let missing = || MakeHumanError::MissingGroup {
             path: self.path.clone(),
             group: group.to_owned(),
             needed_by: needed_by.to_owned(),
-        })
+        };
+        let number = self.names.get(group).copied().ok_or_else(missing)?;
+        let vertices = |&face: &u32| {
+            let corners = self.file.corners(self.file.faces[face as usize]);
+            corners.iter().map(|corner| corner.vertex()).collect()
+        };
+        Ok(self.faces[number].iter().map(vertices))
     }
 
     fn mean(&self, vertices: impl Iterator<Item = usize>) -> Option<Vector3<f64>> {
@@ -191,8 +201,8 @@ fn read_bones(path: &Path, groups: &Groups) -> Result<Vec<Bone>, MakeHumanError>
     Ok(bones)
 }
 
-fn distinct(polygons: &[Vec<usize>]) -> Vec<usize> {
-    let mut vertices = polygons.concat();
+fn distinct(polygons: impl Iterator<Item = Vec<usize>>) -> Vec<usize> {
+    let mut vertices: Vec<usize> = polygons.flatten().collect();
     vertices.sort_unstable();
     vertices.dedup();
     vertices

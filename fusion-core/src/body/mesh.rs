@@ -1,5 +1,4 @@
-use std::fmt::Write as _;
-
+use mesh_io::obj::ObjMesh;
 use nalgebra::Vector3;
 
 /// Triangles with unit normals at the vertices.
@@ -39,18 +38,15 @@ pub fn vertex_normals(vertices: &[Vector3<f64>], triangles: &[[u32; 3]]) -> Vec<
             normals[vertex as usize] += normal;
         }
     }
-    normals.iter().map(|normal| normal.try_normalize(0.0).unwrap_or_default()).collect()
+    normals.iter_mut().for_each(|normal| *normal = normal.try_normalize(0.0).unwrap_or_default());
+    normals
 }
 
 /// Formats a mesh as Wavefront OBJ, with micrometre precision.
 #[must_use]
 pub fn obj_text(vertices: &[Vector3<f64>], triangles: &[[u32; 3]]) -> String {
-    let mut text = String::new();
-    for v in vertices {
-        writeln!(text, "v {:.6} {:.6} {:.6}", v.x, v.y, v.z).expect("writing to a string succeeds");
-    }
-    for [a, b, c] in triangles {
-        writeln!(text, "f {} {} {}", a + 1, b + 1, c + 1).expect("writing to a string succeeds");
-    }
-    text
+    let positions: Vec<[f64; 3]> = vertices.iter().map(|&vertex| vertex.into()).collect();
+    let triangles: Vec<[usize; 3]> = triangles.iter().map(|corners| corners.map(|corner| corner as usize)).collect();
+    let mesh = ObjMesh { positions: &positions, digits: 6, normals: None, triangles: &triangles, strands: &[] };
+    mesh_io::obj::obj_text(&mesh)
 }

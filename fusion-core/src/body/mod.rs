@@ -1,8 +1,6 @@
 //! Skinned bodies: a mesh at rest, bones, and skinning weights.
 
-mod accessor;
 mod figure;
-mod glb;
 mod gltf_file;
 mod makehuman;
 mod mesh;

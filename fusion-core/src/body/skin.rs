@@ -1,10 +1,9 @@
 //! The bones of a glTF skin.
 
-use gltf::json::{Root, Skin};
+use mesh_io::gltf::json::{Root, Skin};
+use mesh_io::gltf::{Accessors, Fault, Usage, Values};
 use nalgebra::{Matrix4, Point3, Vector3};
 
-use super::accessor::{Accessors, Usage};
-use super::glb::Fault;
 use super::skinned::Bone;
 
 /// The bones of a skin, parents first.
@@ -20,12 +19,12 @@ impl SkinBones {
     pub(super) fn read(root: &Root, skin: &Skin, accessors: &mut Accessors<'_>) -> Result<Self, Fault> {
         let fault = |reason: String| Fault::new("the skin", reason);
         let matrices = skin.inverse_bind_matrices.ok_or_else(|| fault("it has no inverse bind matrices".into()))?;
-        let binds: Vec<[f64; 16]> = accessors.read(matrices.value(), &Usage::BIND_MATRICES)?;
+        let binds: Values<'_, 16> = accessors.read(matrices.value(), &Usage::BIND_MATRICES)?;
         let joints: Vec<usize> = skin.joints.iter().map(|node| node.value()).collect();
         if binds.len() < joints.len() {
             return Err(fault(format!("it has {} joints, but {} inverse bind matrices", joints.len(), binds.len())));
         }
-        let heads: Result<Vec<Vector3<f64>>, String> = binds[..joints.len()].iter().enumerate().map(head).collect();
+        let heads: Result<Vec<Vector3<f64>>, String> = binds.iter().take(joints.len()).enumerate().map(head).collect();
         let heads = heads.map_err(fault)?;
         let parents = parents(root, &joints).map_err(fault)?;
         let mut children: Vec<Vec<usize>> = vec![Vec::new(); joints.len()];
@@ -54,8 +53,8 @@ impl SkinBones {
 }
 
 /// Returns the position of a joint at rest.
-fn head((joint, columns): (usize, &[f64; 16])) -> Result<Vector3<f64>, String> {
-    let inverse = Matrix4::from_column_slice(columns).try_inverse();
+fn head((joint, columns): (usize, [f64; 16])) -> Result<Vector3<f64>, String> {
+    let inverse = Matrix4::from_column_slice(&columns).try_inverse();
     let head = inverse.map(|matrix| matrix.transform_point(&Point3::origin()).coords);
     head.filter(|head| head.iter().all(|x| x.is_finite()))
         .ok_or_else(|| format!("the inverse bind matrix of joint {joint} cannot be inverted"))

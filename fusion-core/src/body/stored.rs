@@ -1,6 +1,6 @@
 use std::path::{Path, PathBuf};
 
-use mesh_obj::{ObjFile, ObjFileError};
+use mesh_io::obj::{ObjFile, ObjFileError};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
@@ -77,7 +77,7 @@ pub fn write_body(path: &Path, body: &SkinnedBody) -> Result<(), BodyFileError> 
 /// # Errors
 /// If the file cannot be read or is malformed.
 pub fn read_vertices(path: &Path) -> Result<Vec<Vector3<f64>>, BodyFileError> {
-    positions(&ObjFile::read(path)?, path)
+    positions(&mut ObjFile::read(path)?, path)
 }
 
 /// Reads an OBJ file, in metres, as a body without bones. Polygons are split into triangles.
@@ -85,22 +85,24 @@ pub fn read_vertices(path: &Path) -> Result<Vec<Vector3<f64>>, BodyFileError> {
 /// # Errors
 /// If the file cannot be read, is malformed, or has no triangles.
 pub fn read_obj(path: &Path) -> Result<SkinnedBody, BodyFileError> {
-    let file = ObjFile::read(path)?;
-    let vertices = positions(&file, path)?;
-    let mut triangles = Vec::new();
+    let mut file = ObjFile::read(path)?;
+    let vertices = positions(&mut file, path)?;
+    let mut triangles = Vec::with_capacity(file.faces.iter().map(|&face| file.corners(face).len() - 2).sum());
     for &face in &file.faces {
         let corners = file.corners(face);
         let vertex = |corner: usize| corners[corner].vertex() as u32;
         triangles.extend((2..corners.len()).map(|end| [vertex(0), vertex(end - 1), vertex(end)]));
     }
+    drop(file);
     SkinnedBody::without_bones(Mesh::new(vertices, triangles))
         .map_err(|source| BodyFileError::Body { path: path.into(), source })
 }
 
-fn positions(file: &ObjFile, path: &Path) -> Result<Vec<Vector3<f64>>, BodyFileError> {
+/// Takes the positions of a file.
+fn positions(file: &mut ObjFile, path: &Path) -> Result<Vec<Vector3<f64>>, BodyFileError> {
     match file.vertices.iter().position(|p| !p.iter().all(|x| x.is_finite())) {
         Some(vertex) => Err(BodyFileError::NonFinite { path: path.into(), line: file.vertex_lines[vertex] }),
-        None => Ok(file.vertices.iter().copied().map(Vector3::from).collect()),
+        None => Ok(std::mem::take(&mut file.vertices).into_iter().map(Vector3::from).collect()),
     }
 }
 

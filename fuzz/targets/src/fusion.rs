@@ -9,7 +9,7 @@ use fusion_core::depth::{Camera, DepthImage, DepthSequence, PixelRays, read_dept
 use fusion_core::model::{DeformationModel, ModelOptions};
 use fusion_core::skeleton::{Bvh, JointTrack, Retarget, Skeleton};
 use fusion_core::tracker::{Tracker, TrackerOptions, TrackerState};
-use mesh_obj::ObjFile;
+use mesh_io::obj::ObjFile;
 
 use crate::target::{Target, message, text};
 

@@ -168,14 +168,17 @@ pub(super) fn has_area([a, b, c]: [Vector3<f64>; 3]) -> bool {
 }
 
 fn check_edges(triangles: &[[usize; 3]]) -> Result<(), MeshError> {
-    let ends = |a: usize, b: usize| [a.min(b), a.max(b)];
-    let of = |(triangle, &[a, b, c]): (usize, &[usize; 3])| [ends(a, b), ends(b, c), ends(c, a)].map(|e| (e, triangle));
-    let mut along: Vec<([usize; 2], usize)> = triangles.iter().enumerate().flat_map(of).collect();
+    // Short numbers: these are the most memory that a mesh takes. No memory holds 2³² triangles.
+    let ends = |a: usize, b: usize| [a.min(b) as u32, a.max(b) as u32];
+    let mut along: Vec<([u32; 2], u32)> = Vec::with_capacity(3 * triangles.len());
+    for (triangle, &[a, b, c]) in triangles.iter().enumerate() {
+        along.extend([ends(a, b), ends(b, c), ends(c, a)].map(|edge| (edge, triangle as u32)));
+    }
     along.sort_unstable();
     match along.chunk_by(|a, b| a.0 == b.0).find(|along| along.len() > 2) {
         Some(along) => {
-            let triangles = along.iter().map(|&(_, triangle)| triangle).collect();
-            Err(MeshError::NonManifoldEdge { edge: along[0].0, triangles })
+            let triangles = along.iter().map(|&(_, triangle)| triangle as usize).collect();
+            Err(MeshError::NonManifoldEdge { edge: along[0].0.map(|vertex| vertex as usize), triangles })
         }
         None => Ok(()),
     }

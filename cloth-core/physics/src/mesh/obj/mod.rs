@@ -2,13 +2,14 @@
 
 mod weld;
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use energy_dsl::Vector3;
 
 use energy_files::excerpt;
-use mesh_obj::{Corner, Face, ObjFile, ObjFileError};
+use mesh_io::obj::{Corner, Face, ObjFile, ObjFileError};
 
 use super::{CornerAttributes, MeshError, TriangleMesh};
 
@@ -87,121 +88,148 @@ pub fn read_obj_surface(path: &Path, options: ObjOptions<'_>) -> Result<ObjSurfa
 
 fn surface(file: &ObjFile, path: &Path, options: ObjOptions<'_>) -> Result<ObjSurface, ObjError> {
     let faces = chosen_faces(file, path, options.groups)?;
-    Triangulation::new(file, &faces, options.weld).surface(file, path)
+    Triangulation::new(file, faces, options.weld).surface(path)
 }
 
 /// Returns the faces of the groups.
-fn chosen_faces(file: &ObjFile, path: &Path, groups: Option<&[String]>) -> Result<Vec<Face>, ObjError> {
-    let Some(groups) = groups else { return Ok(file.faces.clone()) };
+fn chosen_faces<'a>(file: &'a ObjFile, path: &Path, groups: Option<&[String]>) -> Result<Cow<'a, [Face]>, ObjError> {
+    let Some(groups) = groups else { return Ok(Cow::Borrowed(&file.faces)) };
     let number = |name: &String| {
         let unknown =
             || ObjError::UnknownGroup { path: path.to_owned(), name: name.clone(), known: file.names.clone() };
-        file.names.iter().position(|known| known == name).ok_or_else(unknown)
+        file.names.iter().position(|known| known == name).map(|number| number as u32).ok_or_else(unknown)
     };
-    let wanted: Vec<usize> = groups.iter().map(number).collect::<Result<_, _>>()?;
+    let wanted: Vec<u32> = groups.iter().map(number).collect::<Result<_, _>>()?;
     let is_wanted = |face: &Face| file.groups(*face).iter().any(|group| wanted.contains(group));
     Ok(file.faces.iter().copied().filter(is_wanted).collect())
 }
 
-/// The triangles of faces, with vertices numbered from 0 without unused ones.
-struct Triangulation {
+/// The triangles of faces, with vertices numbered from 0 without unused ones. Triangles are formed as they are visited:
+/// a file may have one for every two of its bytes.
+struct Triangulation<'a> {
+    file: &'a ObjFile,
+    faces: Cow<'a, [Face]>,
     /// The vertex of the file for each vertex.
-    sources: Vec<usize>,
-    triangles: Vec<[usize; 3]>,
-    /// The corners of each triangle in the file, and its face.
-    corners: Vec<[Corner; 3]>,
-    faces: Vec<Face>,
-    /// The index of each triangle before welding.
-    kept: Vec<usize>,
-    unwelded: usize,
+    sources: Vec<u32>,
+    /// The vertex for each vertex of the file; [`UNUSED`] for those of no face.
+    number: Vec<u32>,
+    /// Whether vertices were merged. That closes triangles that are smaller than the distance.
+    is_welded: bool,
+    /// Number of vertices that were merged with another one.
     welded: usize,
 }
 
-impl Triangulation {
-    fn new(file: &ObjFile, faces: &[Face], weld: Option<f64>) -> Self {
-        let mut used = vec![false; file.vertices.len()];
-        faces.iter().flat_map(|face| file.corners(*face)).for_each(|corner| used[corner.vertex()] = true);
-        let used: Vec<usize> = (0..used.len()).filter(|&vertex| used[vertex]).collect();
-        // The vertex of the file that stands for each.
-        let mut merged: Vec<usize> = (0..file.vertices.len()).collect();
+/// A triangle of a face.
+struct Part {
+    /// Its index before welding.
+    index: usize,
+    face: Face,
+    /// Its corners in the file.
+    corners: [Corner; 3],
+    vertices: [usize; 3],
+}
+
+/// Stands for no vertex. Files are too small for so many.
+const UNUSED: u32 = u32::MAX;
+
+impl<'a> Triangulation<'a> {
+    fn new(file: &'a ObjFile, faces: Cow<'a, [Face]>, weld: Option<f64>) -> Self {
+        let mut number = vec![UNUSED; file.vertices.len()];
+        faces.iter().flat_map(|face| file.corners(*face)).for_each(|corner| number[corner.vertex()] = 0);
+        let mut sources: Vec<u32> = (0..number.len() as u32).filter(|&v| number[v as usize] != UNUSED).collect();
+        let used = sources.len();
+        sources.iter().enumerate().for_each(|(place, &vertex)| number[vertex as usize] = place as u32);
         if let Some(distance) = weld {
-            let positions: Vec<Vector3<f64>> = used.iter().map(|&vertex| file.vertices[vertex]).collect();
+            let positions: Vec<Vector3<f64>> = sources.iter().map(|&vertex| file.vertices[vertex as usize]).collect();
             let first = weld::welded(&positions, distance);
-            used.iter().zip(first).for_each(|(&vertex, first)| merged[vertex] = used[first]);
-        }
-        let sources: Vec<usize> = used.iter().copied().filter(|&vertex| merged[vertex] == vertex).collect();
-        let mut number = vec![usize::MAX; file.vertices.len()];
-        sources.iter().enumerate().for_each(|(place, &vertex)| number[vertex] = place);
-        let welded = used.len() - sources.len();
-        let count = faces.iter().map(|face| file.corners(*face).len() - 2).sum();
-        let (triangles, corners) = (Vec::with_capacity(count), Vec::with_capacity(count));
-        let (owners, kept, unwelded) = (Vec::with_capacity(count), Vec::with_capacity(count), 0);
-        let mut all = Self { sources, triangles, corners, faces: owners, kept, unwelded, welded };
-        for face in faces {
-            let polygon = file.corners(*face);
-            for end in 2..polygon.len() {
-                let corners = [polygon[0], polygon[end - 1], polygon[end]];
-                let triangle = corners.map(|corner| number[merged[corner.vertex()]]);
-                let [a, b, c] = triangle;
-                // Welding closes triangles that are smaller than its distance.
-                if weld.is_none() || a != b && b != c && c != a {
-                    all.triangles.push(triangle);
-                    all.corners.push(corners);
-                    all.faces.push(*face);
-                    all.kept.push(all.unwelded);
+            let all = std::mem::take(&mut sources);
+            // The first of the merged vertices comes before the others, and has its number by then.
+            for (place, &vertex) in all.iter().enumerate() {
+                number[vertex as usize] = number[all[first[place]] as usize];
+                if first[place] == place {
+                    number[vertex as usize] = sources.len() as u32;
+                    sources.push(vertex);
                 }
-                all.unwelded += 1;
             }
         }
-        all
+        let welded = used - sources.len();
+        Self { file, faces, sources, number, is_welded: weld.is_some(), welded }
     }
 
-    fn surface(self, file: &ObjFile, path: &Path) -> Result<ObjSurface, ObjError> {
-        let vertices = self.sources.iter().map(|&vertex| file.vertices[vertex]).collect();
-        let corners = self.attributes(file);
-        let mut groups: BTreeMap<String, Vec<usize>> = BTreeMap::new();
-        let mut group_triangles: BTreeMap<String, Vec<usize>> = BTreeMap::new();
-        for (number, (triangle, face)) in self.triangles.iter().zip(&self.faces).enumerate() {
-            for name in file.groups(*face).iter().map(|&name| &file.names[name]) {
-                groups.entry(name.clone()).or_default().extend(triangle);
-                group_triangles.entry(name.clone()).or_default().push(number);
-            }
-        }
-        for vertices in groups.values_mut() {
+    /// Returns the triangles that welding has not closed.
+    fn parts(&self) -> impl Iterator<Item = Part> {
+        let fan = |face: &Face| {
+            let (face, polygon) = (*face, self.file.corners(*face));
+            (2..polygon.len()).map(move |end| (face, [polygon[0], polygon[end - 1], polygon[end]]))
+        };
+        let parts = self.faces.iter().flat_map(fan).enumerate().map(|(index, (face, corners))| {
+            let vertices = corners.map(|corner| self.number[corner.vertex()] as usize);
+            Part { index, face, corners, vertices }
+        });
+        parts.filter(|part| {
+            let [a, b, c] = part.vertices;
+            !self.is_welded || a != b && b != c && c != a
+        })
+    }
+
+    fn surface(&self, path: &Path) -> Result<ObjSurface, ObjError> {
+        let file = self.file;
+        let unwelded_triangles = self.faces.iter().map(|face| file.corners(*face).len() - 2).sum();
+        let mut triangles = Vec::with_capacity(unwelded_triangles);
+        triangles.extend(self.parts().map(|part| part.vertices));
+        let mut kept = Vec::with_capacity(unwelded_triangles);
+        kept.extend(self.parts().map(|part| part.index));
+        let vertices = self.sources.iter().map(|&vertex| file.vertices[vertex as usize]).collect();
+        let mesh = TriangleMesh::new(vertices, triangles).map_err(|source| self.unfit(path, source))?;
+        let uvs = self.attribute(kept.len(), |corner| corner.uv().map(|uv| file.uvs[uv]));
+        let corners = CornerAttributes { uvs, normals: self.attribute(kept.len(), Corner::normal) };
+        let group_triangles = self.group_triangles();
+        let groups = group_triangles.iter().map(|(name, triangles)| {
+            let mut vertices: Vec<usize> = triangles.iter().flat_map(|&number| mesh.triangles()[number]).collect();
             vertices.sort_unstable();
             vertices.dedup();
-        }
-        let mesh = TriangleMesh::new(vertices, self.triangles.clone());
-        let mesh = mesh.map_err(|source| self.unfit(file, path, source))?;
+            vertices.shrink_to_fit();
+            (name.clone(), vertices)
+        });
+        let groups = groups.collect();
         let warps = corners.uvs.as_ref().map(|uvs| mesh.warps_of(uvs));
-        let Self { kept, unwelded, welded, .. } = self;
-        let mesh = mesh.with_warps(warps);
-        Ok(ObjSurface { mesh, corners, groups, group_triangles, kept, unwelded_triangles: unwelded, welded })
+        let (mesh, welded) = (mesh.with_warps(warps), self.welded);
+        Ok(ObjSurface { mesh, corners, groups, group_triangles, kept, unwelded_triangles, welded })
     }
 
-    /// Texture coordinates and normals, each only if all corners have them.
-    fn attributes(&self, file: &ObjFile) -> CornerAttributes {
-        let of = |pick: fn(Corner) -> Option<usize>| -> Option<Vec<[usize; 3]>> {
-            let triangle = |corners: &[Corner; 3]| -> Option<[usize; 3]> {
-                let [a, b, c] = corners.map(pick);
-                Some([a?, b?, c?])
-            };
-            self.corners.iter().map(triangle).collect()
+    /// Returns an attribute of the corners; `None` unless all of them have it.
+    fn attribute<T>(&self, triangles: usize, of: impl Fn(Corner) -> Option<T>) -> Option<Vec<[T; 3]>> {
+        let mut all = Vec::with_capacity(triangles);
+        for Part { corners: [a, b, c], .. } in self.parts() {
+            all.push([of(a)?, of(b)?, of(c)?]);
+        }
+        Some(all)
+    }
+
+    /// Returns the triangles of each group, object and material.
+    fn group_triangles(&self) -> BTreeMap<String, Vec<usize>> {
+        let names = &self.file.names;
+        let mut counts = vec![0; names.len()];
+        let all = || {
+            self.parts()
+                .enumerate()
+                .flat_map(|(at, part)| self.file.groups(part.face).iter().map(move |&name| (name as usize, at)))
         };
-        let uvs = of(Corner::uv);
-        let uvs = uvs.map(|uvs| uvs.into_iter().map(|corners| corners.map(|corner| file.uvs[corner])).collect());
-        CornerAttributes { uvs, normals: of(Corner::normal) }
+        all().for_each(|(name, _)| counts[name] += 1);
+        let mut triangles: Vec<Vec<usize>> = counts.into_iter().map(Vec::with_capacity).collect();
+        all().for_each(|(name, triangle)| triangles[name].push(triangle));
+        let named = names.iter().cloned().zip(triangles);
+        named.filter(|(_, triangles)| !triangles.is_empty()).collect()
     }
 
-    fn unfit(&self, file: &ObjFile, path: &Path, source: MeshError) -> ObjError {
+    fn unfit(&self, path: &Path, source: MeshError) -> ObjError {
+        let line_of = |triangle: usize| self.parts().nth(triangle).map(|part| part.face.line());
         let line = match &source {
             MeshError::NonFiniteVertex { vertex, .. } | MeshError::Unreferenced { vertex, .. } => {
-                self.sources.get(*vertex).map(|&vertex| file.vertex_lines[vertex] as usize)
+                self.sources.get(*vertex).map(|&vertex| self.file.vertex_lines[vertex as usize] as usize)
             }
-            MeshError::VertexOutOfRange { triangle, .. } | MeshError::ZeroArea { triangle, .. } => {
-                Some(self.faces[*triangle].line())
-            }
-            MeshError::NonManifoldEdge { triangles, .. } => triangles.last().map(|&last| self.faces[last].line()),
+            MeshError::VertexOutOfRange { triangle, .. } | MeshError::ZeroArea { triangle, .. } => line_of(*triangle),
+            MeshError::NonManifoldEdge { triangles, .. } => triangles.last().and_then(|&last| line_of(last)),
             MeshError::Empty { .. } => None,
         };
         ObjError::Unfit { path: path.to_owned(), line, source }

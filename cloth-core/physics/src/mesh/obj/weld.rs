@@ -14,17 +14,27 @@ pub(super) fn welded(vertices: &[Vector3<f64>], distance: f64) -> Vec<usize> {
     let largest = vertices.iter().flatten().fold(0.0, |largest: f64, c| largest.max(c.abs()));
     let size = distance.max(1e-15 * largest).max(f64::MIN_POSITIVE);
     let cell = |p: &Vector3<f64>| p.map(|coordinate| (coordinate / size).floor() as i64);
-    let mut cells: HashMap<[i64; 3], Vec<usize>> = HashMap::new();
+    // The last vertex in each cell, and for each vertex the one before it in its cell.
+    let (mut last, mut before) = (HashMap::<[i64; 3], u32>::new(), vec![None; vertices.len()]);
     let mut sets = DisjointSets::singletons(vertices.len());
     for (vertex, p) in vertices.iter().enumerate() {
         let home = cell(p);
+        let mut is_new = true;
         for neighbour in 0..27_i64 {
             let offset = [neighbour % 3 - 1, neighbour / 3 % 3 - 1, neighbour / 9 - 1];
             let at = std::array::from_fn(|axis| home[axis].saturating_add(offset[axis]));
-            let near = cells.get(&at).into_iter().flatten();
-            near.filter(|&&other| norm(subtract(*p, vertices[other])) <= distance).for_each(|&o| sets.join(o, vertex));
+            let next = |other: &u32| before[*other as usize];
+            for other in std::iter::successors(last.get(&at).copied(), next).map(|other| other as usize) {
+                if norm(subtract(*p, vertices[other])) <= distance {
+                    sets.join(other, vertex);
+                    is_new &= vertices[other] != *p;
+                }
+            }
         }
-        cells.entry(home).or_default().push(vertex);
+        // Of vertices at one place, later ones are compared with the first only: there may be millions.
+        if is_new {
+            before[vertex] = last.insert(home, vertex as u32);
+        }
     }
     (0..vertices.len()).map(|vertex| sets.representative(vertex)).collect()
 }

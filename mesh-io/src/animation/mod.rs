@@ -10,7 +10,7 @@
 //! times in seconds.
 //!
 //! ```
-//! use mesh_animation::{AnimatedMesh, Axes, Elements, Shape, animation_glb};
+//! use mesh_io::animation::{AnimatedMesh, Axes, Elements, Shape, animation_glb};
 //!
 //! // A triangle of 1 m that rises by 10 mm per frame, at 0, 40 and 80 ms.
 //! let shape = |frame: usize| {
@@ -30,15 +30,14 @@
 //! };
 //! let glb = animation_glb(&[mesh], &[0.0, 0.04, 0.08], Axes::ZUp)?;
 //! assert!(glb.starts_with(b"glTF"));
-//! # Ok::<(), mesh_animation::AnimationError>(())
+//! # Ok::<(), mesh_io::animation::AnimationError>(())
 //! ```
-#![forbid(unsafe_code)]
 
-mod animation;
 mod document;
+mod encode;
 mod error;
 mod mesh;
 
-pub use animation::animation_glb;
+pub use encode::animation_glb;
 pub use error::AnimationError;
 pub use mesh::{AnimatedMesh, Axes, Elements, Shape};

@@ -1,44 +1,49 @@
 //! Numbers in the data of a glTF file. Types, counts and places are checked before anything is read.
 
-use gltf::json::Accessor;
-use gltf::json::accessor::{ComponentType, Type, sparse::Sparse};
-use gltf::json::validation::Checked;
+use gltf_json::Accessor;
+use gltf_json::accessor::{ComponentType, Type, sparse::Sparse};
+use gltf_json::validation::Checked;
 
-use super::glb::{Container, Fault};
+use super::container::{Container, Fault};
 
 /// A use of an accessor, and the formats that glTF allows for it.
 #[derive(Debug)]
-pub(super) struct Usage {
+pub struct Usage {
     /// The name, for messages.
-    pub name: &'static str,
-    pub shape: Type,
-    pub components: &'static [ComponentType],
+    name: &'static str,
+    shape: Type,
+    components: &'static [ComponentType],
     /// Whether integers stand for numbers from 0 to 1.
-    pub normalised: bool,
+    normalised: bool,
 }
 
 impl Usage {
-    pub(super) const POSITIONS: Self =
+    /// Positions of vertices.
+    pub const POSITIONS: Self =
         Self { name: "positions", shape: Type::Vec3, components: &[ComponentType::F32], normalised: false };
-    pub(super) const INDICES: Self = Self {
+    /// Corners of triangles, as indices of vertices.
+    pub const INDICES: Self = Self {
         name: "indices",
         shape: Type::Scalar,
         components: &[ComponentType::U8, ComponentType::U16, ComponentType::U32],
         normalised: false,
     };
-    pub(super) const JOINTS: Self = Self {
+    /// Joints that move a vertex, as indices of a skin's joints.
+    pub const JOINTS: Self = Self {
         name: "joints",
         shape: Type::Vec4,
         components: &[ComponentType::U8, ComponentType::U16],
         normalised: false,
     };
-    pub(super) const WEIGHTS: Self = Self {
+    /// Weights of the joints of a vertex.
+    pub const WEIGHTS: Self = Self {
         name: "weights",
         shape: Type::Vec4,
         components: &[ComponentType::F32, ComponentType::U8, ComponentType::U16],
         normalised: true,
     };
-    pub(super) const BIND_MATRICES: Self =
+    /// Matrices from the mesh at rest to the joints, by columns.
+    pub const BIND_MATRICES: Self =
         Self { name: "inverse bind matrices", shape: Type::Mat4, components: &[ComponentType::F32], normalised: false };
 
     /// Checks the type of an accessor, and returns that of its components.
@@ -62,13 +67,44 @@ impl Usage {
 /// The numbers of a file. Together, no more are read than the file has bytes of data: accessors that share bytes, or
 /// have none, do not multiply.
 #[derive(Debug)]
-pub(super) struct Accessors<'a> {
+pub struct Accessors<'a> {
     file: &'a Container<'a>,
     /// Numbers that may still be read.
     budget: u64,
 }
 
+/// The checked elements of an accessor, of `N` numbers each. They are decoded as they are visited.
+#[derive(Clone, Debug)]
+pub struct Values<'a, const N: usize> {
+    count: usize,
+    component: ComponentType,
+    /// The data of all elements; `None` if they are zero.
+    dense: Option<Elements<'a>>,
+    /// The elements that are stored apart.
+    sparse: Option<Replaced<'a>>,
+}
+
+impl<const N: usize> Values<'_, N> {
+    /// Number of elements, at least 1.
+    #[expect(clippy::len_without_is_empty, reason = "an accessor has elements")]
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.count
+    }
+
+    /// Returns the elements in their order.
+    pub fn iter(&self) -> impl Iterator<Item = [f64; N]> {
+        let mut replaced = self.sparse.iter().flat_map(Replaced::iter).peekable();
+        (0..self.count).map(move |at| {
+            let stored = replaced.next_if(|(index, _)| *index == at).map(|(_, bytes)| bytes);
+            let bytes = stored.or_else(|| self.dense.as_ref().map(|dense| dense.at(at)));
+            bytes.map_or([0.0; N], |bytes| decoded(bytes, self.component))
+        })
+    }
+}
+
 /// Equally long elements at equal distances, in bytes.
+#[derive(Clone, Copy, Debug)]
 struct Elements<'a> {
     data: &'a [u8],
     stride: usize,
@@ -76,8 +112,26 @@ struct Elements<'a> {
 }
 
 impl<'a> Elements<'a> {
-    fn iter(&self) -> impl Iterator<Item = &'a [u8]> {
-        self.data.chunks(self.stride).map(|element| &element[..self.size])
+    fn at(&self, index: usize) -> &'a [u8] {
+        &self.data[index * self.stride..][..self.size]
+    }
+}
+
+/// Elements that are stored apart, with the increasing indices of those that they replace.
+#[derive(Clone, Debug)]
+struct Replaced<'a> {
+    count: usize,
+    index_type: ComponentType,
+    indices: Elements<'a>,
+    values: Elements<'a>,
+}
+
+impl<'a> Replaced<'a> {
+    fn iter(&self) -> impl Iterator<Item = (usize, &'a [u8])> {
+        (0..self.count).map(|at| {
+            let [index] = decoded::<1>(self.indices.at(at), self.index_type);
+            (index as usize, self.values.at(at))
+        })
     }
 }
 
@@ -89,25 +143,33 @@ struct Place {
 }
 
 impl<'a> Accessors<'a> {
-    pub(super) fn new(file: &'a Container<'a>) -> Self {
+    /// Creates a reader of a file's numbers.
+    #[must_use]
+    pub fn new(file: &'a Container<'a>) -> Self {
         Self { file, budget: file.data.len() as u64 }
     }
 
     /// Takes numbers from the budget.
-    pub(super) fn charge(&mut self, numbers: u64) -> Result<(), String> {
+    ///
+    /// # Errors
+    /// If fewer are left.
+    pub fn charge(&mut self, numbers: u64) -> Result<(), String> {
         let bytes = self.file.data.len();
         let left = self.budget.checked_sub(numbers);
         self.budget = left.ok_or_else(|| format!("the file has more numbers than its {bytes} bytes of data hold"))?;
         Ok(())
     }
 
-    /// Reads the elements of an accessor, of `N` numbers each.
-    pub(super) fn read<const N: usize>(&mut self, index: usize, usage: &Usage) -> Result<Vec<[f64; N]>, Fault> {
+    /// Returns the elements of an accessor, of `N` numbers each.
+    ///
+    /// # Errors
+    /// If the accessor has another format, lacks data, or has other bounds than it states.
+    pub fn read<const N: usize>(&mut self, index: usize, usage: &Usage) -> Result<Values<'a, N>, Fault> {
         let part = || format!("accessor {index} ({})", usage.name);
-        self.elements_of(index, usage).map_err(|reason| Fault::new(part(), reason))
+        self.values_of(index, usage).map_err(|reason| Fault::new(part(), reason))
     }
 
-    fn elements_of<const N: usize>(&mut self, index: usize, usage: &Usage) -> Result<Vec<[f64; N]>, String> {
+    fn values_of<const N: usize>(&mut self, index: usize, usage: &Usage) -> Result<Values<'a, N>, String> {
         let accessors = &self.file.root.accessors;
         let accessor = accessors.get(index).ok_or_else(|| format!("there are only {} accessors", accessors.len()))?;
         let component = usage.check(accessor)?;
@@ -116,51 +178,50 @@ impl<'a> Accessors<'a> {
             return Err("expected at least one element".into());
         }
         self.charge(count.saturating_mul(N as u64))?;
-        let mut values = vec![[0.0; N]; count as usize];
-        if let Some(view) = accessor.buffer_view {
+        let dense = accessor.buffer_view.map(|view| {
             let place = Place { view: view.value(), offset: accessor.byte_offset.map_or(0, |offset| offset.0) };
-            let elements = self.elements(place, count, N * component.size(), component)?;
-            values.iter_mut().zip(elements.iter()).for_each(|(value, bytes)| *value = decoded(bytes, component));
-        } else if accessor.sparse.is_none() {
+            self.elements(place, count, N * component.size(), component)
+        });
+        if dense.is_none() && accessor.sparse.is_none() {
             return Err("it has no buffer view".into());
         }
-        if let Some(sparse) = &accessor.sparse {
-            self.replace(&mut values, sparse, component)?;
-        }
+        let count = count as usize;
+        let sparse =
+            accessor.sparse.as_ref().map(|sparse| self.replaced(count, sparse, N * component.size(), component));
+        let values = Values { count, component, dense: dense.transpose()?, sparse: sparse.transpose()? };
         check_bounds(accessor, &values)?;
         Ok(values)
     }
 
-    /// Replaces some elements by those that an accessor stores apart.
-    fn replace<const N: usize>(
+    /// Returns the elements that an accessor of `elements` elements stores apart.
+    fn replaced(
         &self,
-        values: &mut [[f64; N]],
+        elements: usize,
         sparse: &Sparse,
+        size: usize,
         component: ComponentType,
-    ) -> Result<(), String> {
+    ) -> Result<Replaced<'a>, String> {
         let count = sparse.count.0;
-        if count == 0 || count > values.len() as u64 {
-            return Err(format!("expected 1 to {} sparse elements, got {count}", values.len()));
+        if count == 0 || count > elements as u64 {
+            return Err(format!("expected 1 to {elements} sparse elements, got {count}"));
         }
-        let (indices, replaced) = (&sparse.indices, &sparse.values);
-        let Checked::Valid(index_type) = indices.component_type else {
+        let Checked::Valid(index_type) = sparse.indices.component_type else {
             return Err("the type of its sparse indices is unknown".into());
         };
-        let place = Place { view: indices.buffer_view.value(), offset: indices.byte_offset.0 };
-        let indices = self.elements(place, count, index_type.0.size(), index_type.0)?;
-        let place = Place { view: replaced.buffer_view.value(), offset: replaced.byte_offset.0 };
-        let replaced = self.elements(place, count, N * component.size(), component)?;
+        let index_type = index_type.0;
+        let place = Place { view: sparse.indices.buffer_view.value(), offset: sparse.indices.byte_offset.0 };
+        let indices = self.elements(place, count, index_type.size(), index_type)?;
+        let place = Place { view: sparse.values.buffer_view.value(), offset: sparse.values.byte_offset.0 };
+        let values = self.elements(place, count, size, component)?;
+        let replaced = Replaced { count: count as usize, index_type, indices, values };
         let mut least = 0;
-        for (index, bytes) in indices.iter().zip(replaced.iter()) {
-            let [index] = decoded::<1>(index, index_type.0);
-            let index = index as usize;
-            if index < least || index >= values.len() {
-                return Err(format!("sparse index {index}: expected increasing numbers less than {}", values.len()));
+        for (index, _) in replaced.iter() {
+            if index < least || index >= elements {
+                return Err(format!("sparse index {index}: expected increasing numbers less than {elements}"));
             }
-            values[index] = decoded(bytes, component);
             least = index + 1;
         }
-        Ok(())
+        Ok(replaced)
     }
 
     /// Returns elements of `size` bytes, after checks of their place.
@@ -206,15 +267,15 @@ impl<'a> Accessors<'a> {
 
 /// Compares the smallest and the largest values with those that the accessor states: bytes at a wrong place have
 /// others.
-fn check_bounds<const N: usize>(accessor: &Accessor, values: &[[f64; N]]) -> Result<(), String> {
-    let stated = |bound: &Option<serde_json::Value>| -> Option<[f64; N]> {
-        let list: Vec<f64> = bound.as_ref()?.as_array()?.iter().filter_map(serde_json::Value::as_f64).collect();
+fn check_bounds<const N: usize>(accessor: &Accessor, values: &Values<'_, N>) -> Result<(), String> {
+    let stated = |bound: &Option<gltf_json::Value>| -> Option<[f64; N]> {
+        let list: Vec<f64> = bound.as_ref()?.as_array()?.iter().filter_map(gltf_json::Value::as_f64).collect();
         list.try_into().ok()
     };
     let (Some(least), Some(largest)) = (stated(&accessor.min), stated(&accessor.max)) else { return Ok(()) };
     for axis in 0..N {
         let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
-        for value in values {
+        for value in values.iter() {
             (low, high) = (low.min(value[axis]), high.max(value[axis]));
         }
         // Some exporters round the bounds.

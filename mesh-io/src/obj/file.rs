@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use energy_files::excerpt;
 
-use crate::lines;
+use super::lines;
 
 /// The largest size of a file, in bytes: some three million vertices with faces.
 pub const LARGEST_FILE: u64 = 256 << 20;
@@ -13,6 +13,8 @@ pub const LARGEST_FILE: u64 = 256 << 20;
 pub const MOST_CORNERS: usize = 1 << 16;
 /// The largest number of groups of a face.
 pub const MOST_NAMES: usize = 16;
+/// The largest number of names of groups, objects and materials of a file.
+pub const MOST_FILE_NAMES: usize = 1 << 18;
 /// The largest texture coordinate. Files of results hold them in single precision.
 pub const LARGEST_UV: f64 = 1e9;
 
@@ -101,8 +103,10 @@ pub struct ObjFile {
     /// Names of groups, objects and materials, in the order of the file.
     pub names: Vec<String>,
     corners: Vec<Corner>,
-    /// Sets of groups, object and material that faces have, as indices of names.
-    group_sets: Vec<Vec<usize>>,
+    /// Sets of groups, object and material that faces have: ranges of [`Self::set_names`].
+    group_sets: Vec<(u32, u32)>,
+    /// Indices of names.
+    set_names: Vec<u32>,
 }
 
 /// A malformed line: its number from 1, the problem, and its text.
@@ -112,16 +116,21 @@ struct Malformed {
     text: String,
 }
 
-/// The groups, object and material of the following faces.
+/// The groups, object and material of the following faces, and what the file may still have.
 #[derive(Default)]
 struct Current {
-    groups: Vec<usize>,
-    object: Option<usize>,
-    material: Option<usize>,
+    groups: Vec<u32>,
+    object: Option<u32>,
+    material: Option<u32>,
     /// Index of their set; `None` before the first face.
     set: Option<u32>,
     /// Index of each name.
-    known: BTreeMap<String, usize>,
+    known: BTreeMap<String, u32>,
+    /// Number of triangles that the file may still have. Polygons of short numbers would have one for every two bytes,
+    /// and programs take a hundred bytes for each.
+    triangles: usize,
+    /// Number of triangles that it may still have in groups, each counted as often as it has names.
+    named: usize,
 }
 
 impl ObjFile {
@@ -142,12 +151,12 @@ impl ObjFile {
     ///
     /// ```
     /// use std::path::Path;
-    /// let file = mesh_obj::ObjFile::parse("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", Path::new("a.obj"))?;
+    /// let file = mesh_io::obj::ObjFile::parse("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", Path::new("a.obj"))?;
     /// let corners = file.corners(file.faces[0]);
     /// assert_eq!(corners.iter().map(|corner| corner.vertex()).collect::<Vec<_>>(), [0, 1, 2]);
-    /// let error = mesh_obj::ObjFile::parse("v 0 0 zero\n", Path::new("a.obj")).unwrap_err();
+    /// let error = mesh_io::obj::ObjFile::parse("v 0 0 zero\n", Path::new("a.obj")).unwrap_err();
     /// assert_eq!(error.to_string(), "a.obj:1: expected a number, got `zero`: `v 0 0 zero`");
-    /// # Ok::<(), mesh_obj::ObjFileError>(())
+    /// # Ok::<(), mesh_io::obj::ObjFileError>(())
     /// ```
     pub fn parse(text: &str, path: &Path) -> Result<Self, ObjFileError> {
         Self::parse_lines(text).map_err(|Malformed { line, reason, text }| {
@@ -170,12 +179,14 @@ impl ObjFile {
     /// # Panics
     /// If the face belongs to another file.
     #[must_use]
-    pub fn groups(&self, face: Face) -> &[usize] {
-        &self.group_sets[face.groups as usize]
+    pub fn groups(&self, face: Face) -> &[u32] {
+        let (start, end) = self.group_sets[face.groups as usize];
+        &self.set_names[start as usize..end as usize]
     }
 
     fn parse_lines(text: &str) -> Result<Self, Malformed> {
-        let (mut file, mut current) = (Self::default(), Current::default());
+        let (triangles, named) = (1_000_000 + text.len() / 16, 2_000_000 + text.len() / 4);
+        let (mut file, mut current) = (Self::default(), Current { triangles, named, ..Current::default() });
         let malformed = |line: usize, text: &str, reason: String| {
             let text = excerpt(text.trim()).into_owned();
             Malformed { line, reason, text }
@@ -211,12 +222,12 @@ impl ObjFile {
                 if names.len() > MOST_NAMES {
                     return Err(format!("expected at most {MOST_NAMES} groups"));
                 }
-                current.groups = names.into_iter().map(|name| self.name(name, current)).collect();
+                current.groups = names.into_iter().map(|name| self.name(name, current)).collect::<Result<_, _>>()?;
                 current.set = None;
             }
             Some(keyword @ ("o" | "usemtl")) => {
                 let name = text.trim_start()[keyword.len()..].trim();
-                let named = (!name.is_empty()).then(|| self.name(name, current));
+                let named = if name.is_empty() { None } else { Some(self.name(name, current)?) };
                 *(if keyword == "o" { &mut current.object } else { &mut current.material }) = named;
                 current.set = None;
             }
@@ -245,21 +256,32 @@ impl ObjFile {
         }
         let groups = *current.set.get_or_insert_with(|| {
             let named = current.groups.iter().copied().chain(current.object).chain(current.material);
-            self.group_sets.push(named.collect::<BTreeSet<usize>>().into_iter().collect());
+            let start = self.set_names.len() as u32;
+            self.set_names.extend(named.collect::<BTreeSet<u32>>());
+            self.group_sets.push((start, self.set_names.len() as u32));
             self.group_sets.len() as u32 - 1
         });
+        let (start_name, end_name) = self.group_sets[groups as usize];
+        let named = (count - 2) * (end_name - start_name) as usize;
+        charge(&mut current.triangles, count - 2, "1,000,000 triangles and one for every 16 bytes")?;
+        charge(&mut current.named, named, "2,000,000 triangles in groups and one for every 4 bytes")?;
         let corners = (start as u32, self.corners.len() as u32);
         self.faces.push(Face { corners, line: line as u32, groups });
         Ok(())
     }
 
-    fn name(&mut self, name: &str, current: &mut Current) -> usize {
+    /// Returns the index of a name, after adding it if it is new.
+    fn name(&mut self, name: &str, current: &mut Current) -> Result<u32, String> {
         if let Some(&known) = current.known.get(name) {
-            return known;
+            return Ok(known);
+        }
+        let index = self.names.len();
+        if index == MOST_FILE_NAMES {
+            return Err(format!("a file has at most {MOST_FILE_NAMES} names of groups, objects and materials"));
         }
         self.names.push(name.to_owned());
-        current.known.insert(name.to_owned(), self.names.len() - 1);
-        self.names.len() - 1
+        current.known.insert(name.to_owned(), index as u32);
+        Ok(index as u32)
     }
 
     /// Parses `vertex`, `vertex/uv`, `vertex//normal` or `vertex/uv/normal`.
@@ -288,6 +310,12 @@ impl ObjFile {
             _ => None,
         })
     }
+}
+
+/// Takes triangles from those that are left.
+fn charge(left: &mut usize, count: usize, most: &str) -> Result<(), String> {
+    *left = left.checked_sub(count).ok_or_else(|| format!("a file has at most {most}; are faces repeated?"))?;
+    Ok(())
 }
 
 /// Parses an index: from 1, or from −1 backwards among the `count` before the line. Returns it from 0.
@@ -343,6 +371,17 @@ mod tests {
         }
         let file = ObjFile::parse("vt -1e9 0.5\nvt 3\n", Path::new("a.obj")).unwrap();
         assert_eq!(file.uvs, [[-1e9, 0.5], [3.0, 0.0]]);
+    }
+
+    #[test]
+    fn triangles_and_names_are_limited_by_the_size_of_the_file() {
+        let fan = format!("f {}\n", "1 2 3 ".repeat(20_000)).repeat(20);
+        let error = message(&format!("v 0 0 0\nv 1 0 0\nv 0 1 0\n{fan}"));
+        assert!(error.contains("at most 1,000,000 triangles and one for every 16 bytes"), "{error}");
+        let error = message(&format!("g a b c d\nv 0 0 0\nv 1 0 0\nv 0 1 0\n{fan}"));
+        assert!(error.contains("at most 2,000,000 triangles in groups"), "{error}");
+        let names: String = (0..=MOST_FILE_NAMES).map(|name| format!("o {name}\n")).collect();
+        assert!(message(&names).contains("a.obj:262145: a file has at most 262144 names"), "{}", message(&names));
     }
 
     #[test]

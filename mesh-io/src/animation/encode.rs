@@ -5,9 +5,9 @@ use gltf_json::mesh::{Mode, MorphTarget, Primitive, Semantic};
 use gltf_json::validation::Checked::{self, Valid};
 use gltf_json::{Accessor, Animation, Index, Material, Mesh, Node, Scene};
 
-use crate::document::Document;
-use crate::error::AnimationError;
-use crate::mesh::{AnimatedMesh, Axes, Elements, Shape};
+use super::document::Document;
+use super::error::AnimationError;
+use super::mesh::{AnimatedMesh, Axes, Elements, Shape};
 
 /// The largest number of morph targets of a mesh. Programs keep all targets of a mesh in graphics memory, and visit all
 /// of them for each frame.

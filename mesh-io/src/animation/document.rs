@@ -3,7 +3,7 @@ use gltf_json::buffer::{Target, View};
 use gltf_json::validation::{Checked::Valid, USize64};
 use gltf_json::{Accessor, Buffer, Index, Root};
 
-use crate::error::AnimationError;
+use super::error::AnimationError;
 
 /// A glTF document with its binary buffer.
 #[derive(Default)]
