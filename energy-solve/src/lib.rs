@@ -56,7 +56,10 @@ mod system;
 mod terms;
 pub mod threads;
 
-pub use contact::{Contact, ContactCounts, ContactMemory, ContactModel, ContactsInMatrix, Pressed, Presser, Touching};
+pub use contact::{
+    Contact, ContactCounts, ContactForces, ContactMemory, ContactModel, ContactStep, ContactsInMatrix, Pressed,
+    Presser, Resistance, Touching,
+};
 pub use least_squares::{
     CouplingError, Couplings, GaussNewton, GaussNewtonError, GaussNewtonOptions, IterationReport, LeastSquaresTerm,
     Loss, NormalEquations, NormalMatrix, NormalSolverKind, Outcome, Placed, ResidualTerm, SolverError, TermCost,

@@ -27,7 +27,7 @@ fn free(contact: &Contact) -> Vec<u32> {
 }
 
 fn add(matrix: &mut BlockMatrix, row: u32, column: u32, scale: f64, block: &Block<f64>) {
-    let (slot, _) = matrix.pattern().place(row as usize, column as usize).unwrap();
+    let (slot, _) = matrix.pattern().slot(row as usize, column as usize).unwrap();
     for i in 0..3 {
         for j in 0..3 {
             matrix.values_mut()[slot][i][j] += scale * block[i][j];

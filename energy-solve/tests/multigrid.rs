@@ -40,7 +40,7 @@ fn sheet(cells: usize, stiffness: f64) -> BlockMatrix {
         let (p, q) = (place(a), place(b));
         let d: Vector3<f64> = std::array::from_fn(|axis| q[axis] - p[axis]);
         let square: f64 = d.iter().map(|x| x * x).sum();
-        let (slot, _) = pattern.place(a as usize, b as usize).unwrap();
+        let (slot, _) = pattern.slot(a as usize, b as usize).unwrap();
         for i in 0..3 {
             for j in 0..3 {
                 let entry = k * d[i] * d[j] / square + if i == j { 0.02 } else { 0.0 };
@@ -135,7 +135,7 @@ fn multigrid_solves_for_any_order_of_rows() {
     let mut shuffled = BlockMatrix::zeros(Arc::clone(&pattern));
     for row in 0..rows {
         for (slot, column) in matrix.pattern().row(row) {
-            let (place, turned) = pattern.place(moved(row), moved(column)).unwrap();
+            let (place, turned) = pattern.slot(moved(row), moved(column)).unwrap();
             let block = matrix.values()[slot];
             shuffled.values_mut()[place] =
                 std::array::from_fn(|i| std::array::from_fn(|j| if turned { block[j][i] } else { block[i][j] }));
@@ -158,7 +158,7 @@ fn small_and_disconnected_matrices() {
             *matrix.diagonal_mut(row) = [[2.0, 0.5, 0.0], [0.5, 3.0, 0.1], [0.0, 0.1, 4.0 + row as f64]];
         }
         for [a, b] in &pairs {
-            let (place, _) = pattern.place(*a as usize, *b as usize).unwrap();
+            let (place, _) = pattern.slot(*a as usize, *b as usize).unwrap();
             matrix.values_mut()[place] = [[-1.0, 0.2, 0.0], [0.0, -0.5, 0.0], [0.1, 0.0, -1.0]];
         }
         let (x, report) = solved::<f64>(&matrix, 1e-12, 2);

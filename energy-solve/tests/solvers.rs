@@ -26,12 +26,12 @@ fn matrix(diagonal: f64, skew: f64) -> BlockMatrix {
         (seed >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
     };
     for row in 0..ROWS {
-        for column in (row..ROWS).filter(|&column| pattern.place(row, column).is_some()) {
+        for column in (row..ROWS).filter(|&column| pattern.slot(row, column).is_some()) {
             for i in 0..3 {
                 for j in if row == column { i } else { 0 }..3 {
                     let entry = number() + if (row, i) == (column, j) { diagonal } else { 0.0 };
                     let [(upper, _), (lower, turned)] =
-                        [(row, column), (column, row)].map(|(row, column)| pattern.place(row, column).unwrap());
+                        [(row, column), (column, row)].map(|(row, column)| pattern.slot(row, column).unwrap());
                     matrix.values_mut()[upper][i][j] = entry + skew;
                     if !turned {
                         matrix.values_mut()[lower][j][i] = entry;
@@ -124,7 +124,7 @@ fn indefinite_curvature_is_reported() {
         *linked.diagonal_mut(row) = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
         for column in [row.wrapping_sub(1), row + 1] {
             if column < ROWS {
-                let slot = linked.pattern().place(row, column).unwrap().0;
+                let slot = linked.pattern().slot(row, column).unwrap().0;
                 linked.values_mut()[slot][0][0] = -2.0;
             }
         }
@@ -142,7 +142,7 @@ fn a_breakdown_of_the_recurrence_is_reported() {
     for axis in 0..3 {
         matrix.diagonal_mut(0)[axis][axis] = 1.0;
         matrix.diagonal_mut(1)[axis][axis] = 1.0;
-        matrix.values_mut()[pattern.place(0, 1).unwrap().0][axis][axis] = -2.0;
+        matrix.values_mut()[pattern.slot(0, 1).unwrap().0][axis][axis] = -2.0;
     }
     let (x, report) = solve(bicgstab, &matrix, &[[1.0; 3]; 2], &SolveOptions::default());
     assert_eq!((report.stopped, report.iterations), (StopReason::Breakdown, 0));
@@ -202,7 +202,7 @@ fn an_indefinite_strand_has_no_factor() {
     for row in 0..ROWS {
         *linked.diagonal_mut(row) = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
     }
-    let (slot, _) = linked.pattern().place(0, 1).unwrap();
+    let (slot, _) = linked.pattern().slot(0, 1).unwrap();
     linked.values_mut()[slot] = [[-1.2, 0.0, 0.0], [0.0; 3], [0.0; 3]];
     let mut factor = BlockCholesky::new(linked.pattern()).unwrap();
     assert_eq!(factor.factor(&linked), Err(CholeskyError::NotPositiveDefinite));
@@ -226,7 +226,7 @@ fn sheet(side: usize) -> BlockMatrix {
         *matrix.diagonal_mut(row) = [[0.01, 0.0, 0.0], [0.0, 0.01, 0.0], [0.0, 0.0, 0.01]];
     }
     for [p, q] in links.iter().map(|link| link.map(|vertex| vertex as usize)) {
-        let (slot, _) = matrix.pattern().place(p, q).unwrap();
+        let (slot, _) = matrix.pattern().slot(p, q).unwrap();
         for axis in 0..3 {
             let stiffness = [1.0, 0.7, 0.1][axis];
             matrix.diagonal_mut(p)[axis][axis] += stiffness;

@@ -35,7 +35,7 @@ impl Places {
         let is_stored = |row: u32, column: u32| pattern.storage() == Storage::Whole || row <= column;
         let pairs = free().flat_map(|one| free().map(move |other| (one, other)));
         pairs.filter(|((_, row), (_, column))| is_stored(*row, *column)).all(|((i, row), (j, column))| {
-            let place = pattern.place(row as usize, column as usize);
+            let place = pattern.slot(row as usize, column as usize);
             self.0.extend(place.map(|(place, _)| (i, j, place)));
             place.is_some()
         })

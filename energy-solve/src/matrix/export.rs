@@ -90,7 +90,7 @@ impl<T: Precision> BlockMatrix<T> {
     /// // Two vertices joined by a spring of 3 N/m along x.
     /// let mut matrix = BlockMatrix::zeros(Pattern::from_stencils(Storage::Upper, 2, [&[0, 1][..]]).into());
     /// for (i, j, stiffness) in [(0, 0, 3.0), (0, 1, -3.0), (1, 1, 3.0)] {
-    ///     let (place, _) = matrix.pattern().place(i, j).expect("coupled");
+    ///     let (place, _) = matrix.pattern().slot(i, j).expect("coupled");
     ///     matrix.values_mut()[place][0][0] = stiffness;
     /// }
     /// let csr = matrix.to_csr(Storage::Whole);

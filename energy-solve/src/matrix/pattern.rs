@@ -102,7 +102,7 @@ impl Pattern {
     /// Returns the index of block (row, column) and whether its transpose is stored instead; `None` if it is not in the
     /// pattern.
     #[must_use]
-    pub fn place(&self, row: usize, column: usize) -> Option<(usize, bool)> {
+    pub fn slot(&self, row: usize, column: usize) -> Option<(usize, bool)> {
         let flipped = self.storage == Storage::Upper && column < row;
         let (row, column) = if flipped { (column, row) } else { (row, column) };
         let (start, end) = (self.row_start[row] as usize, self.row_start[row + 1] as usize);
@@ -112,7 +112,7 @@ impl Pattern {
     /// Whether eliminating the rows in order creates fill-in. Chains in order do not fill in; sheets do.
     #[must_use]
     pub fn fills_in(&self) -> bool {
-        let coupled = |i: usize, j: usize| i == j || self.place(i, j).is_some();
+        let coupled = |i: usize, j: usize| i == j || self.slot(i, j).is_some();
         let later = |row: usize| self.row(row).map(|(_, column)| column).filter(move |&column| column > row);
         (0..self.rows()).any(|row| later(row).any(|i| later(row).any(|j| i < j && !coupled(i, j))))
     }

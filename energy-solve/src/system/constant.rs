@@ -113,7 +113,7 @@ pub(super) fn coupled_runs<'a>(
         for i in stencil.clone().filter_map(&row) {
             for j in stencil.clone().filter_map(&row) {
                 if (pattern.storage() == Storage::Whole || i <= j)
-                    && let Some((place, _)) = pattern.place(i, j)
+                    && let Some((place, _)) = pattern.slot(i, j)
                 {
                     coupled[place] = true;
                 }

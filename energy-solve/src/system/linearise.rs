@@ -191,7 +191,7 @@ impl System {
         let changing = terms.filter(|term| term.character().curved && !is_constant(*term));
         let runs = coupled_runs(
             &self.pattern,
-            |vertex| self.dofs.place(vertex as usize),
+            |vertex| self.dofs.row(vertex as usize),
             changing.map(TermDescription::stencils),
         );
         Arc::clone(self.changing.insert(runs))

@@ -72,9 +72,9 @@ impl Places {
         let mut slots = Vec::with_capacity(active.len() * pairs.len());
         let mut transposed = vec![0; active.len().div_ceil(BLOCK) * pairs.len()];
         for (number, element) in active.iter().enumerate() {
-            let row = |point: usize| dofs.place(stencils.vertex(element, point) as usize);
+            let row = |point: usize| dofs.row(stencils.vertex(element, point) as usize);
             for (pair, &(i, j)) in pairs.iter().enumerate() {
-                let place = row(i).zip(row(j)).and_then(|(row, column)| pattern.place(row, column));
+                let place = row(i).zip(row(j)).and_then(|(row, column)| pattern.slot(row, column));
                 let (slot, flipped) = place.unwrap_or((pattern.nowhere(), false));
                 slots.push(index(slot));
                 transposed[number / BLOCK * pairs.len() + pair] |= u16::from(flipped) << (number % BLOCK);

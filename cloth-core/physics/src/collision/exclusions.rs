@@ -73,7 +73,7 @@ impl Exclusions {
         let some: Vec<usize> = (0..x.len()).filter(|&vertex| counts(vertex)).collect();
         let around: Vec<Bounds> =
             some.iter().map(|&vertex| Bounds::of(&[x[vertex]]).extended(0.5 * distance)).collect();
-        Hierarchy::new(&around).meeting_itself([[0, 0]], |one, other| {
+        Hierarchy::new(&around).overlaps_within([[0, 0]], |one, other| {
             let (a, b) = (some[one], some[other]);
             if norm(subtract(x[a], x[b])) < distance {
                 self.vertices.insert([index(a.min(b)), index(a.max(b))]);

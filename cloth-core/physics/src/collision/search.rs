@@ -270,7 +270,7 @@ impl Search {
                 }
             };
             (0..reaches.len()).for_each(|tile| add(tile, tile));
-            self.tiles.meeting_itself([[0, 0]], add);
+            self.tiles.overlaps_within([[0, 0]], add);
         }
         crowded
     }
@@ -280,7 +280,7 @@ impl Search {
         self.obstacles.refit(boxes, 1);
         let near = |tree: &Hierarchy<RoundedMovingBounds>| {
             let mut near = Vec::new();
-            self.tiles.meeting(tree, [[0, 0]], |tile, _| near.push(tile));
+            self.tiles.overlaps_with(tree, [[0, 0]], |tile, _| near.push(tile));
             near.sort_unstable();
             near.dedup();
             near
@@ -299,12 +299,12 @@ impl Search {
     fn find(&self, task: &Task<'_>, mesh: &CollisionMesh) -> Found {
         let (Self { own, obstacles, .. }, mut found) = (self, Found::default());
         match *task {
-            Task::Edges(tiles) => own.edges.meeting_itself(tiles.iter().copied(), |one, other| {
+            Task::Edges(tiles) => own.edges.overlaps_within(tiles.iter().copied(), |one, other| {
                 self.add_edges(mesh, one, other, &mut found);
             }),
             Task::PointsOnTriangles(tiles) => {
                 let reversed = tiles.iter().filter(|[a, b]| a != b).map(|&[a, b]| [b, a]);
-                own.points.meeting(&own.triangles, tiles.iter().copied().chain(reversed), |point, triangle| {
+                own.points.overlaps_with(&own.triangles, tiles.iter().copied().chain(reversed), |point, triangle| {
                     self.add_point_and_triangle(mesh, point, triangle, &mut found);
                 });
             }
@@ -312,13 +312,13 @@ impl Search {
                 let [points, triangles, edges] = obstacles.first;
                 // All features of obstacles are in one group.
                 let group = |&tile: &usize| [tile, 0];
-                own.points.meeting(&obstacles.triangles, near.triangles.iter().map(group), |point, triangle| {
+                own.points.overlaps_with(&obstacles.triangles, near.triangles.iter().map(group), |point, triangle| {
                     self.add_point_and_triangle(mesh, point, triangles + triangle, &mut found);
                 });
-                own.triangles.meeting(&obstacles.points, near.points.iter().map(group), |triangle, point| {
+                own.triangles.overlaps_with(&obstacles.points, near.points.iter().map(group), |triangle, point| {
                     self.add_point_and_triangle(mesh, points + point, triangle, &mut found);
                 });
-                own.edges.meeting(&obstacles.edges, near.edges.iter().map(group), |one, other| {
+                own.edges.overlaps_with(&obstacles.edges, near.edges.iter().map(group), |one, other| {
                     self.add_edges(mesh, one, edges + other, &mut found);
                 });
             }

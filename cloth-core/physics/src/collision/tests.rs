@@ -231,12 +231,12 @@ fn sewn_vertices_count_as_one() {
 
 const REACH: f64 = 3e-3;
 
-/// Returns a pair within reach at x that a neighbourhood does not know, and its distance.
+/// Returns a pair within reach at x that a neighbourhood misses, and its distance.
 fn missing(mesh: &CollisionMesh, neighbourhood: &Neighbourhood, x: &[Vector3<f64>]) -> Option<(Pair, f64)> {
-    let is_known =
-        |pair: &Pair| neighbourhood.nearby().pairs().contains(pair) || neighbourhood.strays().pairs().contains(pair);
+    let is_candidate =
+        |pair: &Pair| neighbourhood.candidates().pairs().contains(pair) || neighbourhood.escaped().pairs().contains(pair);
     let distances = all_pairs(mesh).into_iter().map(|pair| (pair, Closest::of(&pair, &pair.corners(x)).distance));
-    distances.filter(|(_, distance)| *distance <= REACH).find(|(pair, _)| !is_known(pair))
+    distances.filter(|(_, distance)| *distance <= REACH).find(|(pair, _)| !is_candidate(pair))
 }
 
 /// All features of a sheet collide within a reach.
@@ -261,23 +261,23 @@ proptest! {
         }).collect();
         let mut search = Search::new(&mesh, &flat, rules(REACH));
         let mut neighbourhood = Neighbourhood::default();
-        prop_assert!(!neighbourhood.knows(&from));
-        prop_assert!(neighbourhood.follow(&mut search, &mesh, &Move::new(&from, &to), |_| 1e-3, [2e-4, 4e-3]));
-        let found = neighbourhood.strays().pairs();
+        prop_assert!(!neighbourhood.covers(&from));
+        prop_assert!(neighbourhood.search_along(&mut search, &mesh, &Move::new(&from, &to), |_| 1e-3, [2e-4, 4e-3]));
+        let found = neighbourhood.escaped().pairs();
         prop_assert!(found.is_sorted() && found.windows(2).all(|two| two[0] != two[1]));
         prop_assert_eq!(missing(&mesh, &neighbourhood, &at(&from, &to, instant)), None);
 
         let x = at(&from, &to, end);
-        prop_assert!(neighbourhood.knows(&x));
-        neighbourhood.settle(&search, &x);
-        prop_assert!(neighbourhood.strays().pairs().is_empty());
+        prop_assert!(neighbourhood.covers(&x));
+        neighbourhood.refit(&search, &x);
+        prop_assert!(neighbourhood.escaped().pairs().is_empty());
         // Anywhere in the balls.
         let astray: Vec<_> = x.iter().zip(&offsets).map(|(x, (.., stray))| add_scaled(*x, 5e-4, *stray)).collect();
         prop_assert_eq!(missing(&mesh, &neighbourhood, &x), None);
         prop_assert_eq!(missing(&mesh, &neighbourhood, &astray), None);
     }
 
-    /// Moves on which a few vertices leave their balls miss no pair, one after the other, whether they are made or not.
+    /// Moves on which a few vertices escape from their balls miss no pair, one after the other, whether they are made or not.
     #[test]
     fn moves_of_a_few_vertices_miss_no_pair(
         offsets in prop::collection::vec((vector(0.012), vector(0.02)), 25),
@@ -289,49 +289,49 @@ proptest! {
         let mut search = Search::new(&mesh, &flat, rules(REACH));
         let mut neighbourhood = Neighbourhood::default();
         // All vertices move and stop half the way.
-        neighbourhood.follow(&mut search, &mesh, &Move::new(&from, &to), |_| 5e-3, [1e-3, 8e-3]);
+        neighbourhood.search_along(&mut search, &mesh, &Move::new(&from, &to), |_| 5e-3, [1e-3, 8e-3]);
         let mut x = at(&from, &to, 0.5);
-        neighbourhood.settle(&search, &x);
-        for (strays, part) in &moves {
+        neighbourhood.refit(&search, &x);
+        for (escapes, part) in &moves {
             let mut to = x.clone();
-            for &(vertex, stray) in strays {
-                to[vertex] = add_scaled(x[vertex], 1.0, stray);
+            for &(vertex, by) in escapes {
+                to[vertex] = add_scaled(x[vertex], 1.0, by);
             }
-            neighbourhood.follow(&mut search, &mesh, &Move::new(&x, &to), |_| 1e-3, [2e-4, 4e-3]);
+            neighbourhood.search_along(&mut search, &mesh, &Move::new(&x, &to), |_| 1e-3, [2e-4, 4e-3]);
             for instant in [0.0, 0.3, 0.7, 1.0] {
                 prop_assert_eq!(missing(&mesh, &neighbourhood, &at(&x, &to, instant)), None);
             }
             // Short parts stand for moves that are not made.
             if *part > 0.3 {
                 x = at(&x, &to, *part);
-                prop_assert!(neighbourhood.knows(&x));
-                neighbourhood.settle(&search, &x);
+                prop_assert!(neighbourhood.covers(&x));
+                neighbourhood.refit(&search, &x);
                 prop_assert_eq!(missing(&mesh, &neighbourhood, &x), None);
             }
         }
     }
 
-    /// Places off the path of a stray are not known.
+    /// States off the path of an escaped vertex are not covered.
     #[test]
-    fn only_places_on_the_way_are_known(move_by in vector(0.02), aside in vector(1e-3), part in 0.0..1.0_f64) {
+    fn only_states_on_the_path_are_covered(move_by in vector(0.02), aside in vector(1e-3), part in 0.0..1.0_f64) {
         let (mesh, x) = sheet(4);
         let mut search = Search::new(&mesh, &x, rules(REACH));
         let mut neighbourhood = Neighbourhood::default();
-        neighbourhood.follow(&mut search, &mesh, &Move::new(&x, &x), |_| 1e-4, [1e-4; 2]);
-        neighbourhood.settle(&search, &x);
+        neighbourhood.search_along(&mut search, &mesh, &Move::new(&x, &x), |_| 1e-4, [1e-4; 2]);
+        neighbourhood.refit(&search, &x);
         let moved = |by: Vector3<f64>| {
             let mut moved = x.clone();
             moved[7] = add_scaled(x[7], 1.0, by);
             moved
         };
         let to = moved(move_by);
-        neighbourhood.follow(&mut search, &mesh, &Move::new(&x, &to), |_| 1e-4, [1e-4; 2]);
-        prop_assert!(neighbourhood.knows(&at(&x, &to, part)));
+        neighbourhood.search_along(&mut search, &mesh, &Move::new(&x, &to), |_| 1e-4, [1e-4; 2]);
+        prop_assert!(neighbourhood.covers(&at(&x, &to, part)));
         let beside = moved(add_scaled(aside, part, move_by));
         let along = crate::geometry::dot(aside, move_by).powi(2);
         let square = |v: Vector3<f64>| crate::geometry::dot(v, v);
         let is_beside = square(aside) > 1e-7 && along < 0.5 * square(aside) * square(move_by);
-        prop_assert!(!is_beside || part < 0.1 || square(move_by) < 1e-5 || !neighbourhood.knows(&beside));
+        prop_assert!(!is_beside || part < 0.1 || square(move_by) < 1e-5 || !neighbourhood.covers(&beside));
     }
 
     /// The closest points are those of a dense search, and the weights reproduce the distance.

@@ -256,7 +256,7 @@ const PINNED: &str = "Contact moves free vertices only, and all vertices there a
 fn pin_force(body: &Body, force: &[Vector3<f64>]) -> Vector3<f64> {
     let mut total = [0.0; 3];
     for (vertex, force) in force.iter().enumerate() {
-        if body.system.dofs().place(vertex).is_none() {
+        if body.system.dofs().row(vertex).is_none() {
             (0..3).for_each(|axis| total[axis] += force[axis]);
         }
     }

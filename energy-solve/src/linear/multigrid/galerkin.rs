@@ -62,7 +62,7 @@ impl GalerkinProduct {
         let coarse = Pattern::from_pairs(Storage::Upper, interpolation.aggregates(), upper);
         let half = |(row, column): (u32, u32)| {
             let (place, transposed) =
-                coarse.place(row as usize, column as usize).expect("the pattern contains every product");
+                coarse.slot(row as usize, column as usize).expect("the pattern contains every product");
             index(2 * place + usize::from(transposed))
         };
         let mut halves = Vec::with_capacity(of_rows(0..fine.rows()).count());

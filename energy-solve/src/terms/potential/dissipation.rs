@@ -71,7 +71,7 @@ impl<L: DissipationLaw> TermDescription for DissipationTerm<L> {
 impl<L: DissipationLaw + 'static> Term for DissipationTerm<L> {
     fn place(self: Box<Self>, dofs: &DofMap, pattern: &Pattern) -> Box<dyn PlacedTerm> {
         let stencils = self.stencils();
-        let is_free = |vertex: u32| dofs.place(vertex as usize).is_some();
+        let is_free = |vertex: u32| dofs.row(vertex as usize).is_some();
         let is_free = stencils.iter().map(|mut stencil| stencil.any(is_free)).collect();
         let places = BlockPlaces::of_all(stencils, dofs, pattern);
         let acting = acting::<L>(Vec::new(), &self, &places);

@@ -376,7 +376,7 @@ impl TermDescription for PlateTerm {
 
 impl Term for PlateTerm {
     fn place(mut self: Box<Self>, dofs: &DofMap, pattern: &Pattern) -> Box<dyn PlacedTerm> {
-        let is_free = |&vertex: &usize| dofs.place(vertex).is_some();
+        let is_free = |&vertex: &usize| dofs.row(vertex).is_some();
         self.active =
             (0..self.patches.len()).filter(|&patch| self.patches[patch].vertices.iter().any(is_free)).collect();
         let mut needed: Vec<usize> =
@@ -390,8 +390,8 @@ impl Term for PlateTerm {
         let vertices: Vec<u32> = self.needed.iter().flat_map(|&hinge| self.hinges[hinge].map(index)).collect();
         self.hinge_places = BlockPlaces::of_all(Stencils::new(4, &vertices), dofs, pattern);
         let slot = |i: usize, j: usize| {
-            let rows = dofs.place(i).zip(dofs.place(j));
-            index(rows.and_then(|(row, column)| pattern.place(row, column)).map_or(pattern.nowhere(), |(slot, _)| slot))
+            let rows = dofs.row(i).zip(dofs.row(j));
+            index(rows.and_then(|(row, column)| pattern.slot(row, column)).map_or(pattern.nowhere(), |(slot, _)| slot))
         };
         self.places.clear();
         for &patch in &self.active {
