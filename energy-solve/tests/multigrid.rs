@@ -14,7 +14,7 @@ use nalgebra::{DMatrix, DVector};
 fn sheet(cells: usize, stiffness: f64) -> BlockMatrix {
     let vertex = |i: usize, j: usize| (j * (cells + 1) + i) as u32;
     let rows = (cells + 1) * (cells + 1);
-    let place = |v: u32| {
+    let row = |v: u32| {
         let (i, j) = (v as usize % (cells + 1), v as usize / (cells + 1));
         let [x, y] = [i, j].map(|k| k as f64 / cells as f64);
         [x, y, 0.05 * (7.0 * x + 3.0 * y).sin() + 0.02 * (23.0 * y).cos()]
@@ -37,7 +37,7 @@ fn sheet(cells: usize, stiffness: f64) -> BlockMatrix {
         }
     }
     for ([a, b], k) in links {
-        let (p, q) = (place(a), place(b));
+        let (p, q) = (row(a), row(b));
         let d: Vector3<f64> = std::array::from_fn(|axis| q[axis] - p[axis]);
         let square: f64 = d.iter().map(|x| x * x).sum();
         let (slot, _) = pattern.slot(a as usize, b as usize).unwrap();
@@ -135,9 +135,9 @@ fn multigrid_solves_for_any_order_of_rows() {
     let mut shuffled = BlockMatrix::zeros(Arc::clone(&pattern));
     for row in 0..rows {
         for (slot, column) in matrix.pattern().row(row) {
-            let (place, turned) = pattern.slot(moved(row), moved(column)).unwrap();
+            let (new_slot, turned) = pattern.slot(moved(row), moved(column)).unwrap();
             let block = matrix.values()[slot];
-            shuffled.values_mut()[place] =
+            shuffled.values_mut()[new_slot] =
                 std::array::from_fn(|i| std::array::from_fn(|j| if turned { block[j][i] } else { block[i][j] }));
         }
     }
@@ -158,8 +158,8 @@ fn small_and_disconnected_matrices() {
             *matrix.diagonal_mut(row) = [[2.0, 0.5, 0.0], [0.5, 3.0, 0.1], [0.0, 0.1, 4.0 + row as f64]];
         }
         for [a, b] in &pairs {
-            let (place, _) = pattern.slot(*a as usize, *b as usize).unwrap();
-            matrix.values_mut()[place] = [[-1.0, 0.2, 0.0], [0.0, -0.5, 0.0], [0.1, 0.0, -1.0]];
+            let (slot, _) = pattern.slot(*a as usize, *b as usize).unwrap();
+            matrix.values_mut()[slot] = [[-1.0, 0.2, 0.0], [0.0, -0.5, 0.0], [0.1, 0.0, -1.0]];
         }
         let (x, report) = solved::<f64>(&matrix, 1e-12, 2);
         assert!(report.converged() && report.iterations < 20, "{rows} rows: {report:?}");

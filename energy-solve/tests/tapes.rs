@@ -183,8 +183,8 @@ impl OwnLaw for OwnSprings {
                 }
                 if order == Order::Jacobians {
                     for (i, j) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
-                        let place = 36 * element + 6 * (3 * i + axis) + 3 * j + axis;
-                        results.by_position[place] = if i == j { -k } else { *k };
+                        let entry = 36 * element + 6 * (3 * i + axis) + 3 * j + axis;
+                        results.by_position[entry] = if i == j { -k } else { *k };
                     }
                 }
             }

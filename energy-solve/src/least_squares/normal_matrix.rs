@@ -175,9 +175,9 @@ impl<const D: usize> NormalMatrix<D> {
     /// Returns block (row, column); zero if it is not in the pattern.
     #[must_use]
     pub fn block(&self, row: usize, column: usize) -> [[f64; D]; D] {
-        let place = self.pattern.slot(row, column);
+        let slot = self.pattern.slot(row, column);
         let entry = |i: usize, j: usize| {
-            place.map_or(0.0, |(at, turned)| if turned { self.values[at][j][i] } else { self.values[at][i][j] })
+            slot.map_or(0.0, |(at, turned)| if turned { self.values[at][j][i] } else { self.values[at][i][j] })
         };
         std::array::from_fn(|i| std::array::from_fn(|j| entry(i, j)))
     }

@@ -40,8 +40,8 @@ impl Pattern {
         for row in 0..rows {
             let named = start[row]..start[row + 1];
             columns[named.clone()].sort_unstable();
-            for place in named {
-                let column = columns[place];
+            for position in named {
+                let column = columns[position];
                 // Skip duplicates.
                 if end == row_start[row] as usize || columns[end - 1] != column {
                     if column == index(row) {
@@ -179,9 +179,9 @@ fn sorted_by_row(
     }
     let (mut columns, mut next) = (vec![0; start[rows]], start.clone());
     let mut put = |row: u32, column: u32| {
-        let place = &mut next[row as usize];
-        columns[*place] = column;
-        *place += 1;
+        let position = &mut next[row as usize];
+        columns[*position] = column;
+        *position += 1;
     };
     (0..index(rows)).for_each(|row| put(row, row));
     blocks.filter(|&(row, column)| is_stored(row, column)).for_each(|(row, column)| put(row, column));

@@ -7,7 +7,7 @@ mod element_list;
 mod force_term;
 pub(crate) mod linearisation;
 mod own_term;
-mod places;
+mod scatter_map;
 mod potential;
 pub(crate) mod restriction;
 mod scatter;
@@ -22,7 +22,7 @@ pub use element_list::{ElementList, ListError};
 pub use force_term::ForceTerm;
 pub use linearisation::{Linearisation, Weights};
 pub use own_term::{Order, OwnLaw, OwnResults, OwnTerm};
-pub use places::BlockPlaces;
+pub use scatter_map::ScatterMaps;
 pub use potential::{
     DissipationLaw, DissipationTerm, DrivenLaw, DrivenTerm, PotentialTerm, SteeredTapeTerm, SteeredTapes, TapeTerm,
 };

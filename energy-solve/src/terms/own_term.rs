@@ -113,8 +113,8 @@ impl<L: OwnLaw + 'static> Term for OwnTerm<L> {
         let mut slots = Vec::new();
         for element in 0..if curved { stencils.len() } else { 0 } {
             for (i, j) in (0..n).flat_map(|i| (0..n).map(move |j| (i, j))) {
-                let place = row(element, i).zip(row(element, j)).and_then(|(i, j)| pattern.slot(i, j));
-                slots.push(place.and_then(|(slot, transposed)| (!transposed).then_some(slot)));
+                let found = row(element, i).zip(row(element, j)).and_then(|(i, j)| pattern.slot(i, j));
+                slots.push(found.and_then(|(slot, transposed)| (!transposed).then_some(slot)));
             }
         }
         let found = AtomicU64::new(f64::NAN.to_bits());

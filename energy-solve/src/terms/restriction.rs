@@ -3,7 +3,7 @@ use crate::terms::stencils::Stencils;
 
 /// A choice of free vertices of a system; the others are fixed.
 ///
-/// [`PlacedTerm::restricted`](crate::PlacedTerm::restricted) uses it to find the elements that remain, and the places
+/// [`PlacedTerm::restricted`](crate::PlacedTerm::restricted) uses it to find the elements that remain, and the slots
 /// of their blocks in the smaller matrix.
 #[derive(Debug)]
 pub struct Restriction<'a> {

@@ -1,4 +1,4 @@
-//! The place where contact presses the most, for messages.
+//! The feature that contact presses the most, for messages.
 
 use energy_dsl::Vector3;
 use energy_solve::{Pressed, Presser};

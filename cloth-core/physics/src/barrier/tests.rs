@@ -136,8 +136,8 @@ fn distances_and_their_gradients_are_those_of_the_declared_elements() {
         let mut contact = contact(&x);
         update(&mut contact, &x);
         for (pair, _, closest) in active(&contact, &x) {
-            let touched: Vec<usize> = (0..4).filter(|&place| closest.weights[place] != 0.0).collect();
-            let points: Vec<Vector3<f64>> = touched.iter().map(|&place| pair.corners(&x)[place]).collect();
+            let touched: Vec<usize> = (0..4).filter(|&corner| closest.weights[corner] != 0.0).collect();
+            let points: Vec<Vector3<f64>> = touched.iter().map(|&corner| pair.corners(&x)[corner]).collect();
             let (kind, distance, gradient) = match (pair.kind, &points[..]) {
                 (PairKind::PointTriangle, &[p, a]) => {
                     let found = Distance::<f64>::new().gradient(&[p, a]);
@@ -159,8 +159,8 @@ fn distances_and_their_gradients_are_those_of_the_declared_elements() {
             };
             kinds[kind] += 1;
             assert!((distance - closest.distance).abs() < 1e-14, "{distance} {}", closest.distance);
-            for (gradient, place) in gradient.iter().zip(touched) {
-                let expected = closest.normal.map(|component| closest.weights[place] * component);
+            for (gradient, corner) in gradient.iter().zip(touched) {
+                let expected = closest.normal.map(|component| closest.weights[corner] * component);
                 assert!(norm(subtract(*gradient, expected)) < 1e-11, "{gradient:?} {expected:?}");
             }
         }
@@ -261,11 +261,11 @@ fn layers() -> (CollisionMesh, Vec<Vector3<f64>>) {
         [[a, b, c], [a, c, d]]
     };
     let triangles: Vec<_> = squares.flat_map(halves).collect();
-    let place = |number: usize| {
+    let position = |number: usize| {
         let (layer, i, j) = (number / 25, number % 25 / 5, number % 5);
         [0.01 * i as f64 + 0.002 * layer as f64, 0.01 * j as f64, 0.002 * layer as f64]
     };
-    (CollisionMesh::new(50, &triangles, &[], &[]), (0..50).map(place).collect())
+    (CollisionMesh::new(50, &triangles, &[], &[]), (0..50).map(position).collect())
 }
 
 /// The contact of the layers.
@@ -396,7 +396,7 @@ fn threads_change_no_bit_of_many_pairs() {
     const SIDE: usize = 30;
     const VERTICES: usize = 2 * SIDE * SIDE;
     // The upper layer is shifted by a third of a cell, so that edges cross.
-    let place = |vertex: usize| -> Vector3<f64> {
+    let position = |vertex: usize| -> Vector3<f64> {
         let (layer, row, column) = (vertex / (SIDE * SIDE), vertex / SIDE % SIDE, vertex % SIDE);
         let shift = layer as f64 / 3.0;
         let wave = 1e-4 * ((7 * row + 3 * column) as f64).sin();
@@ -410,7 +410,7 @@ fn threads_change_no_bit_of_many_pairs() {
         })
     };
     let triangles: Vec<_> = cells(0).chain(cells(1)).collect();
-    let x: Vec<_> = (0..VERTICES).map(place).collect();
+    let x: Vec<_> = (0..VERTICES).map(position).collect();
     // The upper layer falls and slides, a corner of it so far that its pairs alone are searched for.
     let to = |part: f64, corner: usize| -> Vec<Vector3<f64>> {
         let falls = |vertex: usize| vertex >= SIDE * SIDE && vertex % SIDE < corner && vertex / SIDE % SIDE < corner;
@@ -429,16 +429,16 @@ fn threads_change_no_bit_of_many_pairs() {
         results.extend(parts);
         step(&mut contact).lag_friction(&resistance(VERTICES));
         for corner in [SIDE, 8] {
-            let place = to(0.2 * parts[0], corner);
-            results.push(update(&mut contact, &place));
-            results.push(contact.energy(&place));
+            let state = to(0.2 * parts[0], corner);
+            results.push(update(&mut contact, &state));
+            results.push(contact.energy(&state));
             let mut force = vec![[0.0; 3]; VERTICES];
-            contact.add_force(&place, &mut force);
+            contact.add_force(&state, &mut force);
             results.extend(force.as_flattened());
-            let contacts = step(&mut contact).stiffness(&dofs, &place).concat();
-            let sticking = contact.friction.stiffness(&place, 1).between(None, None).count();
+            let contacts = step(&mut contact).stiffness(&dofs, &state).concat();
+            let sticking = contact.friction.stiffness(&state, 1).between(None, None).count();
             assert!(sticking > PART, "{sticking} pairs");
-            assert_eq!(contacts.len(), active(&contact, &place).len() + sticking);
+            assert_eq!(contacts.len(), active(&contact, &state).len() + sticking);
             for Contact { weights, block, .. } in contacts {
                 results.extend(weights.iter().chain(block.as_flattened()));
             }

@@ -79,8 +79,8 @@ fn crosses(mesh: &CollisionMesh, x: &[Vector3<f64>], edge: &[u32; 2], triangle: 
         [] => segment_meets_triangle(edge.map(at), corners),
         [common] => {
             let far = if edge[0] == common { edge[1] } else { edge[0] };
-            let place = triangle.iter().position(|&corner| corner == common).unwrap_or(0);
-            let [next, last] = [1, 2].map(|step| corners[(place + step) % 3]);
+            let corner_number = triangle.iter().position(|&corner| corner == common).unwrap_or(0);
+            let [next, last] = [1, 2].map(|step| corners[(corner_number + step) % 3]);
             !mesh.are_joined(&[far], triangle) && enters(at(common), at(far), [next, last])
         }
         _ => false,

@@ -103,7 +103,7 @@ impl CollisionMesh {
     /// The obstacle that a vertex belongs to; `None` for cloth and hair.
     #[inline]
     pub fn obstacle(&self, vertex: u32) -> Option<usize> {
-        (vertex as usize).checked_sub(self.own).map(|place| self.owners[place] as usize)
+        (vertex as usize).checked_sub(self.own).map(|number| self.owners[number] as usize)
     }
 
     /// The obstacle of a pair; `None` for two features of cloth and hair.

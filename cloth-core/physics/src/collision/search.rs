@@ -101,8 +101,8 @@ impl<'a> Wanted<'a> {
 impl Search {
     /// Prepares searches in a mesh that starts at x.
     pub fn new(mesh: &CollisionMesh, x: &[Vector3<f64>], rules: Rules) -> Self {
-        let place = |vertex: usize| MovingBounds::fixed(Bounds::of(&[x[vertex]]));
-        let boxes = Boxes::new(mesh, place, &rules.halves, 1);
+        let position = |vertex: usize| MovingBounds::fixed(Bounds::of(&[x[vertex]]));
+        let boxes = Boxes::new(mesh, position, &rules.halves, 1);
         let own = mesh.own_features();
         let all = [mesh.points().len(), mesh.triangles().len(), mesh.edges().len()];
         let mut tiling = Tiling::new(mesh, x);

@@ -47,7 +47,7 @@ fn on_grid() -> impl Strategy<Value = Vector3<f64>> {
     prop::array::uniform3((-4_i32..=4).prop_map(|number| 0.01 * f64::from(number)))
 }
 
-/// The place of a corner, and its displacement relative to the triangle.
+/// The position of a corner, and its displacement relative to the triangle.
 type Corner = (Vector3<f64>, Vector3<f64>);
 
 /// Positions of the six corners before and after an impact. The triangles fly at each other with up to 100 m/s during
@@ -62,10 +62,10 @@ fn impact() -> impl Strategy<Value = [Vec<Vector3<f64>>; 2]> {
             let length = subtract(velocity, [0.0; 3]).iter().map(|c| c * c).sum::<f64>().sqrt().max(1e-3);
             let direction = velocity.map(|component| component / length);
             let velocity = direction.map(|component| -speed * component);
-            let placed = |(number, &(corner, _)): (usize, &Corner)| {
+            let position = |(number, &(corner, _)): (usize, &Corner)| {
                 if number < 3 { corner } else { add_scaled(corner, gap, direction) }
             };
-            let from: Vec<_> = corners.iter().enumerate().map(placed).collect();
+            let from: Vec<_> = corners.iter().enumerate().map(position).collect();
             let moved = |(number, (from, (_, spread))): (usize, (&Vector3<f64>, &Corner))| {
                 add_scaled(add_scaled(*from, 1.0, *spread), if number < 3 { 0.0 } else { 1.0 }, velocity)
             };
@@ -117,10 +117,10 @@ proptest! {
     ) {
         let (pairs, mut separations) = (pairs(), Separations::default());
         for time in ends {
-            let place = at(&x, &y, 0.02 * time);
-            separations.measure(&pairs, &place, &[half; 6], 1);
+            let state = at(&x, &y, 0.02 * time);
+            separations.measure(&pairs, &state, &[half; 6], 1);
             let mut fresh = Separations::default();
-            fresh.measure(&pairs, &place, &[half; 6], 1);
+            fresh.measure(&pairs, &state, &[half; 6], 1);
             for (bound, separation) in separations.all.iter().zip(&fresh.all) {
                 prop_assert!(bound <= separation, "{} {}", bound, separation);
                 prop_assert!(bound == separation || *bound > 2.0 * half, "{} {}", bound, separation);
@@ -180,9 +180,9 @@ fn sheet(cells: usize) -> (CollisionMesh, Vec<Vector3<f64>>) {
         [[a, b, c], [a, c, d]]
     };
     let triangles: Vec<_> = squares.flat_map(halves).collect();
-    let place = |number: usize| [0.01 * (number / (cells + 1)) as f64, 0.01 * (number % (cells + 1)) as f64, 0.0];
+    let position = |number: usize| [0.01 * (number / (cells + 1)) as f64, 0.01 * (number % (cells + 1)) as f64, 0.0];
     let vertices = (cells + 1) * (cells + 1);
-    (CollisionMesh::new(vertices, &triangles, &[], &[]), (0..vertices).map(place).collect())
+    (CollisionMesh::new(vertices, &triangles, &[], &[]), (0..vertices).map(position).collect())
 }
 
 #[test]
@@ -364,9 +364,9 @@ proptest! {
 /// All pairs of a mesh that share no vertex.
 pub(super) fn all_pairs(mesh: &CollisionMesh) -> Vec<Pair> {
     let mut all = Vec::new();
-    for (place, &p) in mesh.points().iter().enumerate() {
+    for (point, &p) in mesh.points().iter().enumerate() {
         for (number, corners) in mesh.triangles().iter().enumerate().filter(|(_, corners)| !corners.contains(&p)) {
-            let ([a, b, c], features) = (*corners, [place, number].map(energy_solve::index));
+            let ([a, b, c], features) = (*corners, [point, number].map(energy_solve::index));
             all.push(Pair { kind: PairKind::PointTriangle, features, vertices: [p, a, b, c] });
         }
     }

@@ -94,13 +94,13 @@ impl ImplicitEuler {
     fn failure(&self, solution: &Solution, matrix: &BlockMatrix, free: &[usize]) -> StepError {
         let mut residual = vec![[0.0; 3]; free.len()];
         matrix.multiply(&solution.delta, &mut residual);
-        let size = |place: usize| {
-            let error: Vector3<f64> = std::array::from_fn(|axis| solution.rhs[place][axis] - residual[place][axis]);
+        let size = |row: usize| {
+            let error: Vector3<f64> = std::array::from_fn(|axis| solution.rhs[row][axis] - residual[row][axis]);
             // Rank NaN as the largest.
             let size = crate::geometry::norm(error);
             if size.is_nan() { f64::INFINITY } else { size }
         };
-        let worst = (0..free.len()).max_by(|&a, &b| size(a).total_cmp(&size(b))).map_or(0, |place| free[place]);
+        let worst = (0..free.len()).max_by(|&a, &b| size(a).total_cmp(&size(b))).map_or(0, |row| free[row]);
         let report = &solution.report;
         StepError::NotSolved {
             iterations: report.iterations,

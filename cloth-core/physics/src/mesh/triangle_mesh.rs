@@ -121,7 +121,7 @@ impl TriangleMesh {
         Self { vertices: self.vertices.iter().map(|&vertex| pose.transform(vertex)).collect(), ..self }
     }
 
-    /// Returns the mesh with its vertices at other places, in m.
+    /// Returns the mesh with its vertices at other positions, in m.
     pub(crate) fn with_vertices(self, vertices: Vec<Vector3<f64>>) -> Self {
         Self { vertices, ..self }
     }

@@ -131,7 +131,7 @@ impl Triangulation {
         }
         let sources: Vec<usize> = used.iter().copied().filter(|&vertex| merged[vertex] == vertex).collect();
         let mut number = vec![usize::MAX; file.vertices.len()];
-        sources.iter().enumerate().for_each(|(place, &vertex)| number[vertex] = place);
+        sources.iter().enumerate().for_each(|(new, &vertex)| number[vertex] = new);
         let welded = used.len() - sources.len();
         let count = faces.iter().map(|face| file.corners(*face).len() - 2).sum();
         let (triangles, corners) = (Vec::with_capacity(count), Vec::with_capacity(count));
