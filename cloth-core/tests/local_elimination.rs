@@ -105,7 +105,7 @@ proptest! {
             let dissipation = system.dissipation(State { x: &x, v: &faster }).unwrap() - slower;
             let matrices = [Curvature::Exact, Curvature::Clamped].map(|curvature| {
                 let weights = Weights { position: -DT * DT, velocity: -DT };
-                let options = LinearisationOptions { weights, curvature, stiffness_times_velocity: false };
+                let options = LinearisationOptions::new(weights, curvature);
                 let mut matrix = system.matrix();
                 // The second time the constant part is known.
                 system.linearise_with_masses(state, options, &body.masses, &mut matrix).unwrap();

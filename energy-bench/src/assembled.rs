@@ -63,7 +63,7 @@ where
     let mut matrix: BlockMatrix = system.matrix();
     let velocities = vec![[0.0; 3]; positions.len()];
     let weights = Weights { position: 1.0, velocity: 0.0 };
-    let options = LinearisationOptions { weights, curvature, stiffness_times_velocity: false };
+    let options = LinearisationOptions::new(weights, curvature);
     Box::new(move || {
         let forces = system.linearise(State { x: &positions, v: &velocities }, options, &mut matrix);
         black_box((forces.expect("finite elements"), &mut matrix));

@@ -72,8 +72,8 @@ pub use linear::{
 pub use matrix::{BlockMatrix, Blocks, Bsr, Csr, DofMap, Pattern, Precision, Storage, dot, index};
 pub use system::{EvaluationError, LinearisationOptions, LinearisedForces, System, SystemError, TermEnergy};
 pub use terms::{
-    ScatterMaps, Character, Counts, Curvature, DissipationLaw, DissipationTerm, Divisible, DrivenLaw, DrivenTerm,
-    ElementList, ForceTerm, Linearisation, ListError, Order, OwnLaw, OwnResults, OwnTerm, PlacedTerm, PotentialTerm,
-    Quantity, Restriction, Share, State, SteeredTapeTerm, SteeredTapes, Stencils, StepStart, Tally, TapeTerm, Term,
+    Character, Counts, Curvature, DissipationLaw, DissipationTerm, Divisible, DrivenLaw, DrivenTerm, ElementList,
+    ForceTerm, Linearisation, ListError, Order, OwnLaw, OwnResults, OwnTerm, PlacedTerm, PotentialTerm, Quantity,
+    Restriction, ScatterMaps, Share, State, SteeredTapeTerm, SteeredTapes, Stencils, StepStart, Tally, TapeTerm, Term,
     TermDescription, TriangleBuffer, Weights, change_dense,
 };

@@ -64,7 +64,7 @@ fn solved<T: Precision>(matrix: &BlockMatrix, tolerance: f64, threads: usize) ->
     multigrid.take_over(matrix).unwrap();
     let b = load(matrix.pattern().rows());
     let mut x = vec![[0.0; 3]; b.len()];
-    let options = SolveOptions { relative_tolerance: tolerance, iteration_limit: 200 };
+    let options = SolveOptions::new(tolerance).with_iteration_limit(200);
     let report = multigrid.solve(&b, &mut x, &options);
     (x, report)
 }
@@ -84,7 +84,7 @@ fn iterations_hardly_grow_with_the_mesh() {
         let mut relaxed = OverRelaxation::<f32>::new(matrix.pattern());
         relaxed.scale(&matrix).unwrap();
         let b = load(matrix.pattern().rows());
-        let options = SolveOptions { relative_tolerance: 1e-3, ..SolveOptions::default() };
+        let options = SolveOptions::new(1e-3);
         let relaxed = relaxed.solve(&b, &mut vec![[0.0; 3]; b.len()], &options);
         assert!(multigrid.converged() && relaxed.converged(), "{multigrid:?} {relaxed:?}");
         [multigrid.iterations, relaxed.iterations]

@@ -83,7 +83,7 @@ fn solve(
 
 fn assert_solves(solver: Solver, matrix: &BlockMatrix) {
     let b = right_hand_side();
-    let options = SolveOptions { relative_tolerance: 1e-12, ..SolveOptions::default() };
+    let options = SolveOptions::new(1e-12);
     let (x, report) = solve(solver, matrix, &b, &options);
     assert!(report.converged(), "{report:?}");
     let expected = dense(matrix).lu().solve(&DVector::from_iterator(3 * ROWS, b.into_iter().flatten())).unwrap();
@@ -107,7 +107,7 @@ fn tolerance_is_relative_to_the_right_hand_side() {
     let matrix = matrix(6.0, 0.0);
     let b = right_hand_side();
     let tiny: Vec<_> = b.iter().map(|row| row.map(|entry| entry * 2.0_f64.powi(-200))).collect();
-    let options = SolveOptions { relative_tolerance: 1e-6, ..SolveOptions::default() };
+    let options = SolveOptions::new(1e-6);
     for solver in [over_relaxation as Solver, bicgstab] {
         let ((x, whole), (y, scaled)) = (solve(solver, &matrix, &b, &options), solve(solver, &matrix, &tiny, &options));
         assert_eq!(whole.iterations, scaled.iterations);
@@ -152,7 +152,7 @@ fn a_breakdown_of_the_recurrence_is_reported() {
 #[test]
 fn limits_zero_loads_and_broken_numbers_are_reported() {
     let matrix = matrix(6.0, 0.0);
-    let few = SolveOptions { relative_tolerance: 1e-14, iteration_limit: 2 };
+    let few = SolveOptions::new(1e-14).with_iteration_limit(2);
     let mut broken = right_hand_side();
     broken[3][1] = f64::NAN;
     for solver in [over_relaxation as Solver, bicgstab] {
@@ -244,7 +244,7 @@ fn relaxed<T: Precision>(matrix: &BlockMatrix, scale: f64, tolerance: f64) -> (V
     solver.scale(matrix).unwrap();
     let b: Vec<_> = (0..rows).map(|row| [row as f64, 1.0, 0.1 * row as f64].map(|phase| scale * phase.cos())).collect();
     let mut x = vec![[0.0; 3]; rows];
-    let options = SolveOptions { relative_tolerance: tolerance, ..SolveOptions::default() };
+    let options = SolveOptions::new(tolerance);
     let report = solver.solve(&b, &mut x, &options);
     assert!(report.converged(), "{report:?}");
     (x, report)
@@ -257,7 +257,7 @@ fn over_relaxation_saves_iterations_and_serves_in_single_precision() {
     let (rounded, single) = relaxed::<f32>(&matrix, 1.0, 1e-3);
     assert!(double.iterations.abs_diff(single.iterations) <= 1, "{double:?} {single:?}");
     let b: Vec<_> = (0..64 * 64).map(|row| [row as f64, 1.0, 0.1 * row as f64].map(f64::cos)).collect();
-    let options = SolveOptions { relative_tolerance: 1e-3, ..SolveOptions::default() };
+    let options = SolveOptions::new(1e-3);
     // An iteration of BiCGSTAB takes two products with the matrix.
     let (_, unrelaxed) = solve(bicgstab, &matrix, &b, &options);
     let [few, many] = [double.iterations, 2 * unrelaxed.iterations];
@@ -283,7 +283,7 @@ fn single_precision_suffices_in_any_unit() {
 
 #[test]
 fn over_relaxation_says_why_it_stops() {
-    let options = SolveOptions { relative_tolerance: 1e-10, iteration_limit: 2 };
+    let options = SolveOptions::new(1e-10).with_iteration_limit(2);
     let good = matrix(6.0, 0.0);
     let mut solver = OverRelaxation::<f64>::new(good.pattern());
     solver.scale(&good).unwrap();

@@ -120,6 +120,7 @@ pub struct ContactMemory {
 
 /// Numbers of pairs and moves.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[non_exhaustive]
 pub struct ContactCounts {
     /// Searches for candidate pairs.
     pub searches: u64,

@@ -13,6 +13,7 @@ pub(crate) type WideBlock<const D: usize> = [[f64; WIDTH]; D];
 
 /// Stencils that do not fit a pattern.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum CouplingError {
     /// A stencil names a block of unknowns that does not exist.
     #[error("element {element} acts on block {block} of unknowns, but there are only {blocks}")]

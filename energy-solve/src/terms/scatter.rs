@@ -4,7 +4,7 @@
 use energy_dsl::{BLOCK, Block, Lane, Mask, Vector3, triangle_index};
 
 use crate::matrix::precision::{Blocks, Precision};
-use crate::terms::scatter_map::{ScatterMaps, ScatterMap};
+use crate::terms::scatter_map::{ScatterMap, ScatterMaps};
 
 /// Elements that are evaluated together, one per lane.
 #[derive(Clone, Copy, Debug)]

@@ -118,7 +118,8 @@ mod tests {
     #[test]
     fn deflections_are_short_and_lie_across_the_normal() {
         let displacements = [([3, 1], [5e-5, 0.0, 0.0]), ([3, 4], [0.0, 1.0, 0.0])];
-        let bristles = Bristles::new(displacements.into_iter().map(|(features, displacement)| (pair(features), UP, displacement)));
+        let bristles =
+            Bristles::new(displacements.into_iter().map(|(features, displacement)| (pair(features), UP, displacement)));
         assert_eq!(bristles.deflection(&pair([3, 1]), UP, false), [5e-5, 0.0, 0.0]);
         assert_eq!(bristles.deflection(&pair([3, 4]), UP, false), [0.0, LENGTH, 0.0]);
         assert_eq!(bristles.deflection(&pair([3, 1]), [0.6, 0.0, 0.8], false)[0], 5e-5 * 0.64);
@@ -128,7 +129,9 @@ mod tests {
     fn a_point_that_moves_on_keeps_its_deflection() {
         let turned = [0.6, 0.0, 0.8];
         let displacements = [([3, 1], UP, [0.0, 5e-5, 0.0]), ([3, 4], turned, [0.0, 7e-5, 0.0])];
-        let bristles = Bristles::new(displacements.into_iter().map(|(features, normal, displacement)| (pair(features), normal, displacement)));
+        let bristles = Bristles::new(
+            displacements.into_iter().map(|(features, normal, displacement)| (pair(features), normal, displacement)),
+        );
         assert_eq!(bristles.deflection(&pair([3, 2]), UP, false), [0.0, 5e-5, 0.0]);
         assert_eq!(bristles.deflection(&pair([3, 9]), turned, false), [0.0, 7e-5, 0.0]);
         for (features, normal) in [([2, 1], UP), ([4, 1], UP), ([3, 2], [0.0, 0.0, -1.0])] {
@@ -140,7 +143,9 @@ mod tests {
     fn either_edge_of_a_pair_may_move_on() {
         let pair = |features: [u32; 2]| Pair { kind: PairKind::EdgeEdge, ..pair(features) };
         let displacements = [([3, 7], UP, [0.0, 5e-5, 0.0]), ([4, 6], [0.0, 0.0, -1.0], [0.0, 7e-5, 0.0])];
-        let bristles = Bristles::new(displacements.into_iter().map(|(features, normal, displacement)| (pair(features), normal, displacement)));
+        let bristles = Bristles::new(
+            displacements.into_iter().map(|(features, normal, displacement)| (pair(features), normal, displacement)),
+        );
         for bristles in [Bristles::restored(bristles.clone().memory()), bristles] {
             for features in [[3, 7], [3, 8], [2, 7]] {
                 assert_eq!(bristles.deflection(&pair(features), UP, false), [0.0, 5e-5, 0.0], "{features:?}");

@@ -228,7 +228,11 @@ pub(super) struct PairStiffness<'a> {
 
 impl FrictionStiffness<'_> {
     /// The pairs from one pair up to another, in order. `None` stands for no bound.
-    pub fn between(&self, first: Option<&Pair>, end: Option<&Pair>) -> impl Iterator<Item = (&Pair, PairStiffness<'_>)> {
+    pub fn between(
+        &self,
+        first: Option<&Pair>,
+        end: Option<&Pair>,
+    ) -> impl Iterator<Item = (&Pair, PairStiffness<'_>)> {
         let position = |pair: &Pair| self.pairs.partition_point(|one| one.pair < *pair);
         let range = first.map_or(0, position)..end.map_or(self.pairs.len(), position);
         let pairs = self.pairs[range.clone()].iter().zip(&self.blocks[range]);
@@ -267,7 +271,9 @@ impl Part<'_> {
     fn gradients(&self, x: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
         let displacements = self.displacements(x);
         let (mut energies, mut gradients) = (vec![0.0; displacements.len()], vec![[0.0; 3]; displacements.len()]);
-        self.elements.gradients(0..displacements.len(), &displacements, &mut energies, gradients.as_flattened_mut()).expect(ONE_DISPLACEMENT);
+        self.elements
+            .gradients(0..displacements.len(), &displacements, &mut energies, gradients.as_flattened_mut())
+            .expect(ONE_DISPLACEMENT);
         gradients
     }
 
@@ -277,7 +283,9 @@ impl Part<'_> {
         let (mut energies, mut gradients) = (vec![0.0; displacements.len()], vec![0.0; 3 * displacements.len()]);
         let mut blocks = vec![[[0.0; 3]; 3]; displacements.len()];
         let numbers = blocks.as_flattened_mut().as_flattened_mut();
-        self.elements.hessians(0..displacements.len(), &displacements, &mut energies, &mut gradients, numbers).expect(ONE_DISPLACEMENT);
+        self.elements
+            .hessians(0..displacements.len(), &displacements, &mut energies, &mut gradients, numbers)
+            .expect(ONE_DISPLACEMENT);
         blocks
     }
 }

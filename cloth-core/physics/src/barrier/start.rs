@@ -25,6 +25,7 @@ pub(super) const TOUCHING: f64 = 1e-6;
 
 /// A start that contact cannot keep free of crossings, because it is not.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum ContactError {
     /// Edges cross triangles.
     #[error(

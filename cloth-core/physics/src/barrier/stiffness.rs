@@ -1,8 +1,8 @@
 use energy_dsl::Vector3;
 use energy_solve::Contact;
 
-use super::friction::FrictionStiffness;
 use super::active_set::ActivePart;
+use super::friction::FrictionStiffness;
 use super::rolling::rolling;
 use crate::collision::{Closest, CollisionMesh, Pair};
 

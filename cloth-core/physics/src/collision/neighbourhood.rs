@@ -2,7 +2,7 @@ use energy_dsl::Vector3;
 use energy_solve::threads::{collect, collect_each};
 
 use super::displacement::mean;
-use super::{CollisionMesh, Move, MovingBalls, Candidates, Pair, Search};
+use super::{Candidates, CollisionMesh, Move, MovingBalls, Pair, Search};
 use crate::geometry::{Bounds, MovingBounds, add_scaled, dot, norm, subtract};
 
 /// All pairs that can come within reach of each other while each vertex stays in a ball, measured at the current

@@ -233,8 +233,9 @@ const REACH: f64 = 3e-3;
 
 /// Returns a pair within reach at x that a neighbourhood misses, and its distance.
 fn missing(mesh: &CollisionMesh, neighbourhood: &Neighbourhood, x: &[Vector3<f64>]) -> Option<(Pair, f64)> {
-    let is_candidate =
-        |pair: &Pair| neighbourhood.candidates().pairs().contains(pair) || neighbourhood.escaped().pairs().contains(pair);
+    let is_candidate = |pair: &Pair| {
+        neighbourhood.candidates().pairs().contains(pair) || neighbourhood.escaped().pairs().contains(pair)
+    };
     let distances = all_pairs(mesh).into_iter().map(|pair| (pair, Closest::of(&pair, &pair.corners(x)).distance));
     distances.filter(|(_, distance)| *distance <= REACH).find(|(pair, _)| !is_candidate(pair))
 }

@@ -185,7 +185,8 @@ impl<B: Volume> Hierarchy<B> {
         self.nodes[number].bounds = match second {
             None => self.boxes[from..to].iter().copied().fold(B::empty(), B::joined),
             Some(second) => {
-                let (before, after) = positions.split_at(positions.partition_point(|position| *position < self.nodes[second].from));
+                let (before, after) =
+                    positions.split_at(positions.partition_point(|position| *position < self.nodes[second].from));
                 self.refit_positions(number + 1, before);
                 self.refit_positions(second, after);
                 self.nodes[number + 1].bounds.joined(self.nodes[second].bounds)

@@ -9,7 +9,12 @@ use super::{Hierarchy, RoundedMovingBounds, Volume};
 impl<B: Volume> Hierarchy<B> {
     /// Calls `found` with each pair of items of two trees whose boxes overlap, in any order, among some pairs of groups
     /// of these trees. Boxes are rounded outwards to single precision.
-    pub fn overlaps_with(&self, other: &Self, groups: impl IntoIterator<Item = [usize; 2]>, found: impl FnMut(usize, usize)) {
+    pub fn overlaps_with(
+        &self,
+        other: &Self,
+        groups: impl IntoIterator<Item = [usize; 2]>,
+        found: impl FnMut(usize, usize),
+    ) {
         let waiting = groups.into_iter().filter_map(|[a, b]| Some((self.root(a)?, other.root(b)?))).collect();
         dispatch(Overlaps { first: self, second: other, is_one_tree: false, waiting, found });
     }

@@ -3,6 +3,7 @@ use energy_solve::{CholeskyError, EvaluationError, Pressed, SingularBlock, StopR
 /// A step that failed. The message says what failed, and [`StepError::advice`] what may help.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[expect(missing_docs, reason = "the messages name the fields")]
+#[non_exhaustive]
 pub enum StepError {
     /// A force could not be evaluated.
     #[error(transparent)]

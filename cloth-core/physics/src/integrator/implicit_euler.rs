@@ -43,7 +43,7 @@ struct Options(SolveOptions);
 impl Default for Options {
     /// A relative residual of 10⁻⁵ is far below the scheme's own error at any useful step.
     fn default() -> Self {
-        Self(SolveOptions { relative_tolerance: 1e-5, iteration_limit: 5_000 })
+        Self(SolveOptions::new(1e-5).with_iteration_limit(5_000))
     }
 }
 
@@ -69,7 +69,7 @@ impl ImplicitEuler {
     ) -> Result<Solution, StepError> {
         let state = State { x: &body.x, v: &body.v };
         let weights = Weights { position: -dt * dt, velocity: -dt };
-        let options = LinearisationOptions { weights, curvature, stiffness_times_velocity: true };
+        let options = LinearisationOptions::new(weights, curvature).with_stiffness_times_velocity(true);
         let linear = body.system.linearise_with_masses(state, options, &body.masses, matrix)?;
         let rhs = |&vertex: &usize| -> Vector3<f64> {
             let (force, change) = (linear.force[vertex], linear.stiffness_times_velocity[vertex]);

@@ -45,6 +45,7 @@ impl LinearSolverChoice {
 /// Numbers of linear systems solved, by solver.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
+#[non_exhaustive]
 pub struct SolvedBy {
     /// Solves by [`OverRelaxation`].
     pub over_relaxation: u64,

@@ -86,6 +86,7 @@ pub struct IntegratorMemory {
 
 /// The work that a step took.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct StepReport {
     /// Linear systems solved.
     pub solves: u64,

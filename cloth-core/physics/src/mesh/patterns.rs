@@ -114,6 +114,7 @@ impl TriangleMesh {
 /// A rest shape that cannot be scaled.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[expect(missing_docs, reason = "the messages name the fields")]
+#[non_exhaustive]
 pub enum ScaleError {
     /// A triangle has no warp direction.
     #[error(

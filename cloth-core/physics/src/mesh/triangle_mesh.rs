@@ -9,6 +9,7 @@ const SHOWN: usize = 5;
 /// Why vertices and triangles do not form a valid mesh. Indices start from 0.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[expect(missing_docs, reason = "the messages name the fields")]
+#[non_exhaustive]
 pub enum MeshError {
     /// The mesh has no triangles.
     #[error("the mesh has {vertices} vertices and {triangles} triangles; at least one triangle is needed")]

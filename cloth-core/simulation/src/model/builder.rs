@@ -463,7 +463,8 @@ impl<'a> Builder<'a> {
             if let Some(motion) = attachment.motion {
                 let start = model.motions[motion].pose(0.0);
                 // Vertices on an obstacle stay where they are at the start.
-                let initial = if attachment.follows { start.inverse_transform(model.x[vertex]) } else { model.x[vertex] };
+                let initial =
+                    if attachment.follows { start.inverse_transform(model.x[vertex]) } else { model.x[vertex] };
                 if is_held(&attachment) {
                     model.moving.push(MovingPin { vertex, initial, motion });
                 }

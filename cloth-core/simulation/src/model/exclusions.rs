@@ -11,6 +11,7 @@ use crate::scene::{ContactChoice, Exclusion};
 /// An exclusion that is invalid.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[expect(missing_docs, reason = "the messages name the fields")]
+#[non_exhaustive]
 pub enum ExclusionError {
     /// A name belongs to nothing.
     #[error("exclude[{exclusion}]: nothing is called `{name}`; there are {}", .known.join(", "))]

@@ -124,8 +124,7 @@ impl<T: Precision> Couplings<T> {
 
 /// Returns the index, row and column of each block that couples two domains.
 fn outer_blocks<T>(pattern: &Pattern, triangles: &[Triangle<T>]) -> Vec<(usize, [usize; 2])> {
-    let of_row =
-        |row: usize, inner_end: u32| (inner_end as usize..pattern.above(row).end).map(move |slot| (row, slot));
+    let of_row = |row: usize, inner_end: u32| (inner_end as usize..pattern.above(row).end).map(move |slot| (row, slot));
     let blocks = triangles.iter().flat_map(|domain| {
         domain.rows.clone().zip(&domain.inner_end).flat_map(move |(row, &inner_end)| of_row(row, inner_end))
     });

@@ -4,8 +4,8 @@ use super::pack_energies::PackEnergies;
 use super::waiting::Waiting;
 use crate::terms::curvature::{Curvature, Hinges, Orthonormal, Projection, change_dense, is_semi_definite};
 use crate::terms::linearisation::Linearisation;
-use crate::terms::scatter_map::ScatterMaps;
 use crate::terms::scatter::{Lanes, TriangleBuffer, VectorBuffer, points_of_triangle};
+use crate::terms::scatter_map::ScatterMaps;
 
 /// Returns the first `count` lanes of a mask as bits.
 #[inline(always)]

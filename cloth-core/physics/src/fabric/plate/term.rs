@@ -6,8 +6,8 @@ use energy_dsl::{
 };
 use energy_elements::ArcAngle;
 use energy_solve::{
-    ScatterMaps, Blocks, Character, Curvature as CurvaturePolicy, DofMap, Linearisation, Pattern, PlacedTerm,
-    Precision, Quantity, Restriction, State, Stencils, Storage, Tally, Term, TermDescription, index,
+    Blocks, Character, Curvature as CurvaturePolicy, DofMap, Linearisation, Pattern, PlacedTerm, Precision, Quantity,
+    Restriction, ScatterMaps, State, Stencils, Storage, Tally, Term, TermDescription, index,
 };
 
 use super::assembly::{CurvedPart, OuterProducts};
@@ -84,6 +84,7 @@ impl PatchSlots {
 
 /// A plate that does not fit a mesh.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum PlateError {
     /// The rigidities contradict each other.
     #[error(transparent)]

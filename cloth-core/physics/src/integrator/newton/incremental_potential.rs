@@ -116,7 +116,7 @@ impl<'a> IncrementalPotential<'a> {
         let Body { system, masses, x: start, v: before, .. } = &mut *self.body;
         let v = velocities_if_needed(system, before, || velocities(x, start, self.dt));
         let weights = Weights { position: -self.dt * self.dt, velocity: -self.dt };
-        let options = LinearisationOptions { weights, curvature, stiffness_times_velocity: false };
+        let options = LinearisationOptions::new(weights, curvature);
         let linear = system.linearise_with_masses(State { x, v: &v }, options, masses, matrix)?;
         let downhill = self.downhill(x, linear.force);
         self.report.phases.assembly += started.elapsed();

@@ -200,7 +200,7 @@ impl<'a> Iterate<'a> {
         curvature: Curvature,
         relative_tolerance: f64,
     ) -> Result<(Vec<Vector3<f64>>, SolveReport), StepError> {
-        let options = SolveOptions { relative_tolerance, ..SolveOptions::default() };
+        let options = SolveOptions::new(relative_tolerance);
         let contacts = self.potential.contacts(&self.x);
         let (scale, threads) = (self.potential.dt * self.potential.dt, self.potential.body.system.threads());
         let Memory { matrix, solver } = &mut *self.memory;

@@ -134,7 +134,7 @@ impl IncrementalPotential<'_> {
         let mut vectors = vec![[0.0; 3]; downhill.len()];
         let mut solved = SolveReport::indefinite();
         if solver.scale_with_contacts(matrix, &contacts.others).is_ok() {
-            let options = SolveOptions { relative_tolerance: TOLERANCE, ..SolveOptions::default() };
+            let options = SolveOptions::new(TOLERANCE);
             solved = solver.solve(&downhill, &mut vectors, &options);
         }
         matrix.remove_contacts(contacts);

@@ -88,6 +88,7 @@ struct Memory {
 
 /// Wall time by phase.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct Phases {
     /// Gradients, Hessians and assembly.
     pub assembly: Duration,
