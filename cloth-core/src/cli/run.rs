@@ -72,7 +72,8 @@ impl RunScene {
             return dry_run(&text, &scene, threads, log);
         };
         let mut options = RunOptions::default();
-        (options.overwrite, options.checkpoint_interval, options.ignore_memory) = (overwrite, checkpoint, ignore_memory);
+        (options.overwrite, options.checkpoint_interval, options.ignore_memory) =
+            (overwrite, checkpoint, ignore_memory);
         let run = Run::new(text, &scene, &output, options).map_err(|error| match error {
             RunError::Simulation(error) => anyhow::Error::new(error).context(scene.display().to_string()),
             located => located.into(),

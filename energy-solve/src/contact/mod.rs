@@ -1,4 +1,4 @@
-//! Contact: forces between features that meet for a while, and then part.
+//! Contact: forces between features while they are close.
 //!
 //! A [`Term`](crate::Term) has fixed stencils and a fixed matrix pattern. Pairs in contact change from iteration to
 //! iteration, so contact is not a term. A [`ContactStep`] lists the stiffness of the pairs in contact as [`Contact`]s

@@ -74,7 +74,7 @@ pub struct BarrierContact {
     slack: [f64; 2],
     search: Search,
     /// The longest move in this step that is certified as a whole, in m; `None` before its first move. Directions of
-    /// indefinite Hessians may be hundreds of times too long, and would meet millions of pairs.
+    /// indefinite Hessians may be hundreds of times too long, with millions of candidates.
     limit: Option<f64>,
     /// The least limit, in m.
     least_limit: f64,

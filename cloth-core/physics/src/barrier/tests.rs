@@ -58,9 +58,9 @@ fn states() -> Vec<Vec<Vector3<f64>>> {
 fn forces_are_minus_the_gradient_and_neither_push_nor_turn_the_whole() {
     for x in states() {
         let mut contact = contact(&x);
-        let joined = update(&mut contact, &x);
+        let added = update(&mut contact, &x);
         let energy = contact.energy(&x);
-        assert!(energy > 0.0 && energy.is_finite() && (energy - joined).abs() < 1e-15 * energy, "{energy} {joined}");
+        assert!(energy > 0.0 && energy.is_finite() && (energy - added).abs() < 1e-15 * energy, "{energy} {added}");
         let mut force = vec![[0.0; 3]; 6];
         contact.add_force(&x, &mut force);
         let largest = force.iter().map(|f| norm(*f)).fold(0.0, f64::max);
@@ -155,7 +155,7 @@ fn distances_and_their_gradients_are_those_of_the_declared_elements() {
                     let found = EdgeEdgeDistance::<f64>::new().gradient(&[a, b, c, d]);
                     (3, found.value, found.gradient.to_vec())
                 }
-                other => panic!("{other:?} should not have joined"),
+                other => panic!("{other:?} should not be active"),
             };
             kinds[kind] += 1;
             assert!((distance - closest.distance).abs() < 1e-14, "{distance} {}", closest.distance);
@@ -214,7 +214,7 @@ fn starts_that_cross_or_are_too_close_are_refused_by_name() {
 }
 
 #[test]
-fn moves_are_certified_and_pairs_that_block_join() {
+fn moves_are_certified_and_pairs_that_block_become_active() {
     let x = states()[0].clone();
     let mut contact = contact(&x);
     let mut through = x.clone();
@@ -323,7 +323,7 @@ proptest! {
             x = moved(0.5 * part);
             forgetful.neighbourhood.clear();
             prop_assert_eq!(update(&mut known, &x).to_bits(), update(&mut forgetful, &x).to_bits());
-            prop_assert_eq!(joined(&known), joined(&forgetful));
+            prop_assert_eq!(active_laws(&known), active_laws(&forgetful));
         }
         prop_assert!(known.counts.searches < forgetful.counts.searches);
         prop_assert!(!known.active.pairs.is_empty());
@@ -367,25 +367,25 @@ proptest! {
                 for vertex in (0..50).filter(|&vertex| moving[vertex]) {
                     prop_assert!(norm(subtract(forces[1][vertex], forces[0][vertex])) <= 1e-14 * largest);
                 }
-                let mut expected = joined(&whole);
+                let mut expected = active_laws(&whole);
                 expected.retain(|(pair, _)| pair.has_any(&moving));
-                prop_assert_eq!(expected, joined(&restricted));
+                prop_assert_eq!(expected, active_laws(&restricted));
             }
             x = next;
             if number == first {
-                before = joined(&restricted);
+                before = active_laws(&restricted);
                 step(&mut restricted).restrict(&moving);
             } else if number + 1 == last {
                 step(&mut restricted).release();
-                let after = joined(&restricted);
+                let after = active_laws(&restricted);
                 prop_assert!(before.iter().all(|pair| after.contains(pair)));
             }
         }
     }
 }
 
-/// The joined pairs and their stiffness.
-fn joined(contact: &BarrierContact) -> Vec<(Pair, u64)> {
+/// The active pairs and their stiffness.
+fn active_laws(contact: &BarrierContact) -> Vec<(Pair, u64)> {
     let ActiveSet { pairs, laws, .. } = &contact.active;
     pairs.iter().zip(laws).map(|(pair, law)| (*pair, law.stiffness.to_bits())).collect()
 }

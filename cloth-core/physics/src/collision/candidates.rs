@@ -44,7 +44,7 @@ impl Candidates {
     }
 
     /// Measures the pairs at x, and drops those that cannot come within reach while no vertex goes farther than this
-    /// from x: boxes of tilted features meet long before the features do.
+    /// from x: boxes of tilted features overlap long before the features do.
     pub fn keep_near(&mut self, search: &Search, x: &[Vector3<f64>], farthest: &[f64]) {
         self.measure(search, x);
         let kept = self.filtered(search.threads, |Entry { pair, separation, .. }| {

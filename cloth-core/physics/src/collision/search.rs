@@ -19,7 +19,7 @@ const CHANGED: usize = 512;
 /// Pairs of tiles that a thread takes at a time.
 const TILES: usize = 64;
 
-/// Finds the pairs whose vertices may meet within given regions.
+/// Finds the candidate pairs of vertices within given regions.
 #[derive(Clone, Debug)]
 pub struct Search {
     tiling: Arc<Tiling>,
@@ -256,7 +256,7 @@ impl Search {
         }
     }
 
-    /// Returns the pairs of tiles, or of a tile with itself, with features that may meet while each vertex stays in its
+    /// Returns the pairs of tiles, or of a tile with itself, with candidate pairs while each vertex stays in its
     /// ball.
     fn crowded(&mut self, shapes: &Shapes<'_>, balls: &MovingBalls<'_>, threads: usize) -> Vec<[usize; 2]> {
         let reaches = shapes.reaches(balls.radii, &self.rules.halves, threads);
@@ -290,7 +290,7 @@ impl Search {
         NearObstacles { points: near(points), triangles: near(triangles), edges }
     }
 
-    /// Returns all pairs within their reach at x, and others whose boxes meet, in order.
+    /// Returns all pairs within their reach at x, and others whose boxes overlap, in order.
     pub fn pairs_at(&mut self, mesh: &CollisionMesh, x: &[Vector3<f64>]) -> Vec<Pair> {
         self.pairs(mesh, &MovingBalls { ends: [x, x], radii: &vec![0.0; x.len()] })
     }
@@ -333,7 +333,7 @@ impl Search {
     }
 
     /// Returns the pairs with a changed vertex that can come within their reach while each vertex stays in its region,
-    /// and others whose boxes meet. Regions do not move. That of a vertex that is not changed lies in its region of the
+    /// and others whose boxes overlap. Regions do not move. That of a vertex that is not changed lies in its region of the
     /// searches before, at one instant. Its box there serves: a box at rest meets a moving one if they overlap at any
     /// instant.
     pub fn pairs_with(
@@ -410,16 +410,16 @@ impl Search {
     #[inline]
     fn add_point_and_triangle(&self, mesh: &CollisionMesh, point: usize, triangle: usize, found: &mut Found) {
         let (p, corners) = ([mesh.points()[point]], mesh.triangles()[triangle]);
-        if !mesh.are_joined(&p, &corners) && self.can_collide(mesh, &p, &corners) {
+        if !mesh.are_adjacent(&p, &corners) && self.can_collide(mesh, &p, &corners) {
             found.on_triangles.push([index(point), index(triangle)]);
         }
     }
 
-    /// Adds two edges if they can collide. Most edges that meet are neighbours: that test is inlined.
+    /// Adds two edges if they can collide. Most edges whose boxes overlap are neighbours: that test is inlined.
     #[inline(always)]
     fn add_edges(&self, mesh: &CollisionMesh, one: usize, other: usize, found: &mut Found) {
         let (a, b) = (mesh.edges()[one], mesh.edges()[other]);
-        if !mesh.are_joined(&a, &b) {
+        if !mesh.are_adjacent(&a, &b) {
             self.add_separate_edges(mesh, [one, other], [a, b], found);
         }
     }
@@ -437,7 +437,7 @@ impl Search {
         }
     }
 
-    /// Whether two features that are not joined may respond to a contact, and no rule excludes them.
+    /// Whether two features that are not adjacent may respond to a contact, and no rule excludes them.
     fn can_collide(&self, mesh: &CollisionMesh, a: &[u32], b: &[u32]) -> bool {
         a.iter().chain(b).any(|vertex| self.rules.is_free[*vertex as usize])
             && !self.rules.exclusions.exclude(mesh, a, b)

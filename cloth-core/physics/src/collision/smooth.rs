@@ -10,7 +10,7 @@
 //! In the plane, the nearest points of two features without a common vertex are apart by at least w, the least height
 //! of these triangles. One of the points is a vertex. The line to the other leaves the triangles around that vertex
 //! across an opposite side, so it is at least as long as a height. All such features in the rectangle are apart by at
-//! least (1 − ε) w / |P| in space. If vertices stray by r at most from where F is known, 2 r less is left. If that
+//! least (1 − ε) w / |P| in space. If vertices move by r at most from where F is known, 2 r less is left. If that
 //! exceeds the reach, the rectangle has no pairs.
 //!
 //! On a straight move F is linear in time, so |P F − 1| is at most as large as at one of the ends. P is the left

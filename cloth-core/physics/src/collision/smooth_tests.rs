@@ -149,8 +149,8 @@ proptest! {
         let all = search.pairs(&mesh, &balls);
         for (found, radii) in [(&near, &radii[..]), (&all, balls.radii)] {
             let x = at(&from, &to, instant);
-            let stray = |vertex: usize| add_scaled(x[vertex], radii[vertex], noise[vertex].1);
-            let x: Vec<_> = (0..count).map(stray).collect();
+            let moved = |vertex: usize| add_scaled(x[vertex], radii[vertex], noise[vertex].1);
+            let x: Vec<_> = (0..count).map(moved).collect();
             for pair in all_pairs(&mesh) {
                 let is_known = found.binary_search(&pair).is_ok();
                 let apart = Closest::of(&pair, &pair.corners(&x)).distance;

@@ -132,7 +132,7 @@ proptest! {
         }
     }
 
-    /// No impact passes, judged by the exact test along the accepted move.
+    /// No impact passes, by the exact test along the accepted move.
     #[test]
     fn no_impact_passes([from, to] in impact()) {
         const THICKNESS: f64 = 1e-3;
@@ -273,9 +273,9 @@ proptest! {
         neighbourhood.refit(&search, &x);
         prop_assert!(neighbourhood.escaped().pairs().is_empty());
         // Anywhere in the balls.
-        let astray: Vec<_> = x.iter().zip(&offsets).map(|(x, (.., stray))| add_scaled(*x, 5e-4, *stray)).collect();
+        let moved: Vec<_> = x.iter().zip(&offsets).map(|(x, (.., offset))| add_scaled(*x, 5e-4, *offset)).collect();
         prop_assert_eq!(missing(&mesh, &neighbourhood, &x), None);
-        prop_assert_eq!(missing(&mesh, &neighbourhood, &astray), None);
+        prop_assert_eq!(missing(&mesh, &neighbourhood, &moved), None);
     }
 
     /// Moves on which a few vertices escape from their balls miss no pair, one after the other, whether they are made or not.

@@ -196,7 +196,7 @@ impl<T: Precision> LinearSolver<T> {
             }
         };
         if self.choice == LinearSolverChoice::Auto && !self.in_contact && report.converged() {
-            trial.note(report.iterations, options.relative_tolerance);
+            trial.record(report.iterations, options.relative_tolerance);
         }
         (report, solved_by)
     }

@@ -30,7 +30,7 @@ const FAR: f64 = 0.1;
 /// The largest part of the free vertices to eliminate. With more, a local iteration costs nearly as much as a global
 /// one.
 const FEW: f64 = 0.15;
-/// Bounds the work on vertices that do not settle before the fixed ones move.
+/// Bounds the work on vertices that do not come to rest before the fixed ones move.
 const ITERATIONS: usize = 4;
 /// Residual of each linear system relative to its right-hand side. An exact local minimum is not worth more: the next
 /// global iteration moves it.
