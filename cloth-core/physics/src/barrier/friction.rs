@@ -219,31 +219,13 @@ pub(super) struct FrictionStiffness<'a> {
     blocks: Vec<Block<f64>>,
 }
 
-/// The stiffness of the friction of one pair.
-#[derive(Clone, Copy)]
-pub(super) struct PairStiffness<'a> {
-    weights: &'a [f64; 4],
-    block: &'a Block<f64>,
-}
-
 impl FrictionStiffness<'_> {
-    /// The pairs from one pair up to another, in order. `None` stands for no bound.
-    pub fn between(
-        &self,
-        first: Option<&Pair>,
-        end: Option<&Pair>,
-    ) -> impl Iterator<Item = (&Pair, PairStiffness<'_>)> {
+    /// The pairs from one pair up to another, in order, each as a contact without rows. `None` stands for no bound.
+    pub fn between(&self, first: Option<&Pair>, end: Option<&Pair>) -> impl Iterator<Item = (&Pair, Contact)> {
         let position = |pair: &Pair| self.pairs.partition_point(|one| one.pair < *pair);
         let range = first.map_or(0, position)..end.map_or(self.pairs.len(), position);
         let pairs = self.pairs[range.clone()].iter().zip(&self.blocks[range]);
-        pairs.map(|(one, block)| (&one.pair, PairStiffness { weights: &one.weights, block }))
-    }
-}
-
-impl PairStiffness<'_> {
-    /// The contact of vertices with these rows.
-    pub fn contact(self, rows: [u32; 4]) -> Contact {
-        Contact { rows, weights: *self.weights, block: *self.block }
+        pairs.map(|(one, &block)| (&one.pair, Contact { rows: [Contact::FIXED; 4], weights: one.weights, block }))
     }
 }
 

@@ -127,7 +127,7 @@ impl BarrierContact {
     /// vertices escaped from the neighbourhood.
     fn search_along(&mut self, step: &Move<'_>) -> bool {
         let [least, most] = self.slack;
-        let radius = |vertex: usize| (least + SLACK_PER_EXCURSION * step.excursions()[vertex]).min(most);
+        let radius = |vertex: usize| (least + SLACK_PER_EXCURSION * step.excursions[vertex]).min(most);
         let is_new = self.neighbourhood.search_along(&mut self.search, &self.mesh, step, radius, self.slack);
         self.counts.searches += u64::from(is_new);
         self.counts.clear += u64::from(is_new && self.neighbourhood.escaped().pairs().is_empty());

@@ -68,7 +68,7 @@ impl BarrierStep<'_> {
     /// Returns the part of a move that is certified to have no crossing.
     fn safe_part(&mut self, step: &Move<'_>) -> f64 {
         let has_escaped = self.contact.search_along(step);
-        self.contact.neighbourhood.measure(&self.contact.search, step.from());
+        self.contact.neighbourhood.measure(&self.contact.search, step.from);
         let near = self.filter(step, self.contact.neighbourhood.candidates());
         let part = self.record(near);
         if !has_escaped {
@@ -177,7 +177,8 @@ impl ContactStep for BarrierStep<'_> {
             active.evaluate(x, Order::Curvature, search.threads, with_stiffness).into_iter().unzip();
         if contacts.is_empty() {
             // No pair is active, but friction acts on the pairs in contact at the start of the step.
-            contacts.push(friction.between(None, None).map(|(pair, one)| one.contact(rows(pair))).collect());
+            contacts
+                .push(friction.between(None, None).map(|(pair, one)| Contact { rows: rows(pair), ..one }).collect());
         }
         if !neighbourhood.is_restricted() {
             counts.active += active.iter().sum::<usize>() as u64;

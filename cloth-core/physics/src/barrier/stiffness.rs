@@ -20,7 +20,7 @@ pub(super) fn contacts(
     let mut friction = friction.between(active.first, active.end).peekable();
     for (pair, closest, barrier) in active.iter() {
         while let Some((pair, one)) = friction.next_if(|(other, _)| *other < pair) {
-            contacts.push(one.contact(rows(pair)));
+            contacts.push(Contact { rows: rows(pair), ..one });
         }
         let rows = rows(pair);
         contacts.push(along_normal(rows, closest.weights, &closest, barrier.curvature));
@@ -31,7 +31,7 @@ pub(super) fn contacts(
             contacts.extend(tilts.map(|weights| along_normal(rows, weights, &closest, stiffness)));
         }
     }
-    contacts.extend(friction.map(|(pair, one)| one.contact(rows(pair))));
+    contacts.extend(friction.map(|(pair, one)| Contact { rows: rows(pair), ..one }));
     contacts
 }
 

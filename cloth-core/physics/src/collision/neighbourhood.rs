@@ -102,7 +102,7 @@ impl Neighbourhood {
         radius: impl Fn(usize) -> f64 + Sync,
         limits: [f64; 2],
     ) -> bool {
-        let (ends, origins) = ([step.from(), step.to()], step.means().map(|mean| self.origin(mean)));
+        let (ends, origins) = ([step.from, step.to], step.means.map(|mean| self.origin(mean)));
         let threads = search.threads;
         let mut has_escaped = self.escaping(ends, origins, threads);
         let count = has_escaped.iter().filter(|has_escaped| **has_escaped).count();
