@@ -1,5 +1,5 @@
-//! Geometry of collisions: an exact test for crossings, pairs of features that may come in contact, and a certificate that a
-//! straight move keeps them apart.
+//! Geometry of collisions: an exact test for crossings, pairs of features that may come in contact, and a certificate
+//! that a straight move keeps them apart.
 //!
 //! A surface is a [`CollisionMesh`] of points, edges and triangles. Two kinds of pairs suffice: a point and a
 //! triangle, and two edges. If no such pair touches while all vertices move, no edge ever crosses a triangle: the first

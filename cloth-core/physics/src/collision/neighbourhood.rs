@@ -9,8 +9,8 @@ use crate::geometry::{Bounds, MovingBounds, add_scaled, dot, norm, subtract};
 /// iterate.
 ///
 /// Distances do not change if all vertices are translated, so balls move with the mean of all vertices, unless only
-/// some vertices may move. Late iterates of a step move little and need no search. If vertices escape from their
-/// balls on a move, one search finds the pairs that these vertices come near on the way and at its end. The next iterate then
+/// some vertices may move. Late iterates of a step move little and need no search. If vertices escape from their balls
+/// on a move, one search finds the pairs that these vertices come near on the way and at its end. The next iterate then
 /// needs no further search.
 #[derive(Clone, Debug, Default)]
 pub struct Neighbourhood {
@@ -77,8 +77,8 @@ impl Neighbourhood {
         *self = Self::default();
     }
 
-    /// Keeps the pairs of the last step until a vertex escapes from its ball. Then a search for all pairs replaces them, as
-    /// in a run that resumes from a checkpoint.
+    /// Keeps the pairs of the last step until a vertex escapes from its ball. Then a search for all pairs replaces
+    /// them, as in a run that resumes from a checkpoint.
     pub fn begin_step(&mut self) {
         self.escape = Escape::default();
         self.is_old = true;
@@ -90,9 +90,9 @@ impl Neighbourhood {
         self.escape.candidates.measure(search, x);
     }
 
-    /// Finds the pairs of the vertices that escape from their balls on a straight move, up to a radius from their paths.
-    /// Returns whether there are such vertices. If there are many, if nothing is near, or if balls are those of an
-    /// earlier step, all vertices count as escaped, and no other pairs remain. The search may choose other radii
+    /// Finds the pairs of the vertices that escape from their balls on a straight move, up to a radius from their
+    /// paths. Returns whether there are such vertices. If there are many, if nothing is near, or if balls are those of
+    /// an earlier step, all vertices count as escaped, and no other pairs remain. The search may choose other radii
     /// within the `limits`; see [`Search::pairs_near`].
     pub fn search_along(
         &mut self,
@@ -124,7 +124,8 @@ impl Neighbourhood {
         } else {
             let region = |vertex: usize| {
                 let ball = Bounds::of(&[self.centres[vertex]]).extended(self.radii[vertex]);
-                // The region of an escaped vertex must cover the old ball and the new one, wherever on the path that will be.
+                // The region of an escaped vertex must cover the old ball and the new one, wherever on the path that
+                // will be.
                 let [start, end] = paths.bounds(vertex).0;
                 MovingBounds::fixed(if has_escaped[vertex] { ball.around(start).around(end) } else { ball })
             };
@@ -139,7 +140,8 @@ impl Neighbourhood {
         self.candidates.pairs().is_empty()
     }
 
-    /// Returns the pairs of escaped vertices while these are in their old balls or within their radius from their paths.
+    /// Returns the pairs of escaped vertices while these are in their old balls or within their radius from their
+    /// paths.
     fn search_around(
         &self,
         search: &mut Search,

@@ -333,9 +333,9 @@ impl Search {
     }
 
     /// Returns the pairs with a changed vertex that can come within their reach while each vertex stays in its region,
-    /// and others whose boxes overlap. Regions do not move. That of a vertex that is not changed lies in its region of the
-    /// searches before, at one instant. Its box there serves: a box at rest meets a moving one if they overlap at any
-    /// instant.
+    /// and others whose boxes overlap. Regions do not move. That of a vertex that is not changed lies in its region of
+    /// the searches before, at one instant. Its box there serves: a box at rest meets a moving one if they overlap at
+    /// any instant.
     pub fn pairs_with(
         &mut self,
         is_changed: &[bool],

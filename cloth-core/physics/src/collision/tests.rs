@@ -278,7 +278,8 @@ proptest! {
         prop_assert_eq!(missing(&mesh, &neighbourhood, &moved), None);
     }
 
-    /// Moves on which a few vertices escape from their balls miss no pair, one after the other, whether they are made or not.
+    /// Moves on which a few vertices escape from their balls miss no pair, one after the other, whether they are made
+    /// or not.
     #[test]
     fn moves_of_a_few_vertices_miss_no_pair(
         offsets in prop::collection::vec((vector(0.012), vector(0.02)), 25),

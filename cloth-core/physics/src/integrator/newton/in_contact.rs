@@ -99,8 +99,8 @@ impl IncrementalPotential<'_> {
         done
     }
 
-    /// Moves pins and obstacles that contact has stopped further towards their positions at the end of the step. Returns
-    /// the part of the rest of their way that they went.
+    /// Moves pins and obstacles that contact has stopped further towards their positions at the end of the step.
+    /// Returns the part of the rest of their way that they went.
     pub(super) fn move_pins(&mut self, x: &mut [Vector3<f64>]) -> f64 {
         let mut to = x.to_vec();
         for vertex in (0..x.len()).filter(|&vertex| self.body.system.dofs().row(vertex).is_none()) {
