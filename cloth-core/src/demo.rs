@@ -22,6 +22,7 @@ pub fn scene() -> Result<Scene, SceneError> {
 /// Elements with wrong derivatives, or that could not be audited.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("the audit failed; nothing was simulated\n{0}")]
+#[non_exhaustive]
 pub struct AuditError(String);
 
 /// Audits every declared element of a simulation. Returns a table of errors relative to independent derivatives.

@@ -11,6 +11,7 @@ use crate::scene::Scene;
 /// A table of values that is not a sweep of a scene.
 #[derive(Debug, thiserror::Error)]
 #[expect(missing_docs, reason = "the messages name the fields")]
+#[non_exhaustive]
 pub enum SweepError {
     /// The table is malformed. Lines count from 1.
     #[error("line {line}: {message}")]

@@ -91,7 +91,7 @@ proptest! {
         let mut moved = x.clone();
         let farther = displaced(0.015);
         let mut faster = v.clone();
-        for vertex in (0..x.len()).filter(|&vertex| chosen[vertex] && free.place(vertex).is_some()) {
+        for vertex in (0..x.len()).filter(|&vertex| chosen[vertex] && free.row(vertex).is_some()) {
             moved[vertex] = farther[vertex];
             faster[vertex] = [0.3, -0.2, 0.1];
         }
@@ -105,7 +105,7 @@ proptest! {
             let dissipation = system.dissipation(State { x: &x, v: &faster }).unwrap() - slower;
             let matrices = [Curvature::Exact, Curvature::Clamped].map(|curvature| {
                 let weights = Weights { position: -DT * DT, velocity: -DT };
-                let options = LinearisationOptions { weights, curvature, stiffness_times_velocity: false };
+                let options = LinearisationOptions::new(weights, curvature);
                 let mut matrix = system.matrix();
                 // The second time the constant part is known.
                 system.linearise_with_masses(state, options, &body.masses, &mut matrix).unwrap();
@@ -130,7 +130,7 @@ proptest! {
                 }
                 for (column, &j) in rows.iter().enumerate() {
                     let found = matrix.block(row, column);
-                    let expected = all_blocks.block(free.place(i).unwrap(), free.place(j).unwrap());
+                    let expected = all_blocks.block(free.row(i).unwrap(), free.row(j).unwrap());
                     for (found, expected) in found.iter().flatten().zip(expected.iter().flatten()) {
                         assert_close(*found, *expected, 1.0, "block");
                     }

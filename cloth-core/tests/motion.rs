@@ -195,7 +195,7 @@ fn newton_reports_a_flattened_triangle() {
 
 #[test]
 fn internal_forces_conserve_momentum() {
-    let precise = SolveOptions { relative_tolerance: 1e-13, iteration_limit: 10_000 };
+    let precise = SolveOptions::new(1e-13).with_iteration_limit(10_000);
     for fabric in [STVK, PRINTED, SPRINGS] {
         let schemes: [(Box<dyn Integrator>, f64); 2] =
             [(Box::new(SymplecticEuler), 5e-4), (Box::new(ImplicitEuler::with_options(precise)), 5e-3)];
@@ -225,7 +225,7 @@ fn assembled_jacobians_are_derivatives_of_the_assembled_forces() {
         let mut matrix = body.system.matrix();
         let weights = Weights { position: 1.0, velocity: 0.0 };
         let state = State { x: &body.x, v: &v };
-        let options = LinearisationOptions { weights, curvature: Curvature::Exact, stiffness_times_velocity: false };
+        let options = LinearisationOptions::new(weights, Curvature::Exact);
         body.system.linearise(state, options, &mut matrix).unwrap();
         let scale = (0..42).map(|row| matrix.diagonal(row)[0][0].abs()).fold(0.0, f64::max);
         for (vertex, axis) in [(0, 2), (9, 0), (17, 1), (24, 2)] {
@@ -356,7 +356,7 @@ fn too_large_explicit_steps_give_a_warning_and_an_error() {
 fn a_failed_linear_solve_leaves_the_state_unchanged() {
     let mut body = distorted(STVK);
     let before = body.x.clone();
-    let hasty = SolveOptions { relative_tolerance: 1e-12, iteration_limit: 1 };
+    let hasty = SolveOptions::new(1e-12).with_iteration_limit(1);
     let error = ImplicitEuler::with_options(hasty).step(&mut body, 0.01).unwrap_err();
     assert_eq!(error.advice().unwrap(), "Try a smaller dt");
     let error = error.to_string();

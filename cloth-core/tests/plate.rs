@@ -119,7 +119,7 @@ fn forces_and_hessians_are_derivatives_of_the_energy() {
         let v: Vec<Vector3<f64>> = (0..count).map(|i| [0.3, (i as f64).sin(), (2.0 * i as f64).cos()]).collect();
         let mut matrix = system.matrix();
         let weights = Weights { position: 1.0, velocity: 0.0 };
-        let mut options = LinearisationOptions { weights, curvature: Curvature::Exact, stiffness_times_velocity: true };
+        let mut options = LinearisationOptions::new(weights, Curvature::Exact).with_stiffness_times_velocity(true);
         let linear = system.linearise(State { x: &x, v: &v }, options, &mut matrix).unwrap();
         let scale = linear.force.as_flattened().iter().fold(0.0_f64, |scale, f| scale.max(f.abs()));
         let free = system.dofs().free().to_vec();

@@ -63,7 +63,7 @@ where
     let mut matrix: BlockMatrix = system.matrix();
     let velocities = vec![[0.0; 3]; positions.len()];
     let weights = Weights { position: 1.0, velocity: 0.0 };
-    let options = LinearisationOptions { weights, curvature, stiffness_times_velocity: false };
+    let options = LinearisationOptions::new(weights, curvature);
     Box::new(move || {
         let forces = system.linearise(State { x: &positions, v: &velocities }, options, &mut matrix);
         black_box((forces.expect("finite elements"), &mut matrix));
@@ -86,7 +86,7 @@ impl<const N: usize> Scatter<N> {
     fn new(stencils: &[[usize; N]], matrix: BlockMatrix, vertices: usize) -> Self {
         let pairs = stencils.iter().flat_map(|s| (0..N).flat_map(move |i| (i..N).map(move |j| (s[i], s[j]))));
         let places =
-            pairs.map(|(row, column)| matrix.pattern().place(row, column).expect("all are coupled").0).collect();
+            pairs.map(|(row, column)| matrix.pattern().slot(row, column).expect("all are coupled").0).collect();
         let triangle = vec![[[1.0; 3]; 3]; N * (N + 1) / 2 * TOGETHER];
         let forces = vec![[0.0; 3]; vertices];
         Self { stencils: stencils.to_vec(), places, matrix, forces, gradient: [[1.0; 3]; N], triangle }

@@ -140,7 +140,7 @@ fn assembled(term: Box<dyn Term>, x: &[Vector3<f64>], curvature: Curvature) -> f
 
 fn options(curvature: Curvature) -> LinearisationOptions {
     let weights = Weights { position: -1.0, velocity: 0.0 };
-    LinearisationOptions { weights, curvature, stiffness_times_velocity: false }
+    LinearisationOptions::new(weights, curvature)
 }
 
 /// A linear congruential generator.

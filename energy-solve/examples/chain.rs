@@ -28,11 +28,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut system = System::new(terms, &pinned)?;
 
     // The Hessian of the energy is −∂f/∂x. Clamping makes the search direction a descent direction.
-    let options = LinearisationOptions {
-        weights: Weights { position: -1.0, velocity: 0.0 },
-        curvature: Curvature::Clamped,
-        stiffness_times_velocity: false,
-    };
+    let options = LinearisationOptions::new(Weights { position: -1.0, velocity: 0.0 }, Curvature::Clamped);
     let mut x: Vec<Vector3<f64>> = (0..=LINKS).map(|point| [0.125 * point as f64, 0.0, 0.0]).collect();
     let v = vec![[0.0; 3]; x.len()];
     let mut hessian = system.matrix();

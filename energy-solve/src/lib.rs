@@ -56,7 +56,10 @@ mod system;
 mod terms;
 pub mod threads;
 
-pub use contact::{Contact, ContactCounts, ContactMemory, ContactModel, ContactsInMatrix, Pressed, Presser, Touching};
+pub use contact::{
+    Contact, ContactCounts, ContactForces, ContactMemory, ContactModel, ContactStep, ContactsInMatrix, Pressed,
+    Presser, Resistance, Touching,
+};
 pub use least_squares::{
     CouplingError, Couplings, GaussNewton, GaussNewtonError, GaussNewtonOptions, IterationReport, LeastSquaresTerm,
     Loss, NormalEquations, NormalMatrix, NormalSolverKind, Outcome, Placed, ResidualTerm, SolverError, TermCost,
@@ -69,8 +72,8 @@ pub use linear::{
 pub use matrix::{BlockMatrix, Blocks, Bsr, Csr, DofMap, Pattern, Precision, Storage, dot, index};
 pub use system::{EvaluationError, LinearisationOptions, LinearisedForces, System, SystemError, TermEnergy};
 pub use terms::{
-    BlockPlaces, Character, Counts, Curvature, DissipationLaw, DissipationTerm, Divisible, DrivenLaw, DrivenTerm,
-    ElementList, ForceTerm, Linearisation, ListError, Order, OwnLaw, OwnResults, OwnTerm, PlacedTerm, PotentialTerm,
-    Quantity, Restriction, Share, State, SteeredTapeTerm, SteeredTapes, Stencils, StepStart, Tally, TapeTerm, Term,
+    Character, Counts, Curvature, DissipationLaw, DissipationTerm, Divisible, DrivenLaw, DrivenTerm, ElementList,
+    ForceTerm, Linearisation, ListError, Order, OwnLaw, OwnResults, OwnTerm, PlacedTerm, PotentialTerm, Quantity,
+    Restriction, ScatterMaps, Share, State, SteeredTapeTerm, SteeredTapes, Stencils, StepStart, Tally, TapeTerm, Term,
     TermDescription, TriangleBuffer, Weights, change_dense,
 };

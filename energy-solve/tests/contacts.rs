@@ -27,7 +27,7 @@ fn free(contact: &Contact) -> Vec<u32> {
 }
 
 fn add(matrix: &mut BlockMatrix, row: u32, column: u32, scale: f64, block: &Block<f64>) {
-    let (slot, _) = matrix.pattern().place(row as usize, column as usize).unwrap();
+    let (slot, _) = matrix.pattern().slot(row as usize, column as usize).unwrap();
     for i in 0..3 {
         for j in 0..3 {
             matrix.values_mut()[slot][i][j] += scale * block[i][j];
@@ -60,7 +60,7 @@ fn solve(rows: u32, contacts: &[Contact], threads: usize, tolerance: f64) -> (Ve
     let mut solver = OverRelaxation::<f64>::with_threads(matrix.pattern(), threads);
     solver.scale_with_contacts(&matrix, contacts).unwrap();
     let mut x = vec![[0.0; 3]; rows as usize];
-    let options = SolveOptions { relative_tolerance: tolerance, ..SolveOptions::default() };
+    let options = SolveOptions::new(tolerance);
     let report = solver.solve(&right_hand_side(rows), &mut x, &options);
     assert!(report.converged(), "{report:?}");
     (x, report)
@@ -102,7 +102,7 @@ fn contacts_are_part_of_the_sum() {
     solver.scale_with_contacts(&matrix, &contacts).unwrap();
     solver.scale(&matrix).unwrap();
     let mut x = vec![[0.0; 3]; 120];
-    let options = SolveOptions { relative_tolerance: 1e-12, ..SolveOptions::default() };
+    let options = SolveOptions::new(1e-12);
     assert!(solver.solve(&right_hand_side(120), &mut x, &options).converged());
     assert_equal(&x, &expected(120, &[]));
     assert!((x[5][0] - found[5][0]).abs() > 1e-3 * found[5][0].abs());

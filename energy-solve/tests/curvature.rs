@@ -62,7 +62,7 @@ pub(crate) fn hessians<const N: usize>(
     let mut system = System::new(vec![elements], &vec![false; positions.len()]).unwrap();
     let mut matrix = system.matrix();
     let weights = Weights { position: -1.0, velocity: 0.0 };
-    let options = LinearisationOptions { weights, curvature, stiffness_times_velocity: false };
+    let options = LinearisationOptions::new(weights, curvature);
     let v = vec![[0.0; 3]; positions.len()];
     system.linearise(State { x: &positions, v: &v }, options, &mut matrix).unwrap();
     let dense = |stencil: [usize; N]| {

@@ -60,11 +60,7 @@ fn acting_elements_are_summed_for_any_number_of_threads() {
     let x = vec![[0.0; 3]; SIDE * SIDE];
     let v: Vec<Vector3<f64>> = (0..x.len()).map(|i| [i as f64, 2.0 * i as f64, 0.3 * i as f64].map(f64::sin)).collect();
     let state = State { x: &x, v: &v };
-    let options = LinearisationOptions {
-        weights: Weights { position: -1e-4, velocity: -1e-2 },
-        curvature: Curvature::Clamped,
-        stiffness_times_velocity: false,
-    };
+    let options = LinearisationOptions::new(Weights { position: -1e-4, velocity: -1e-2 }, Curvature::Clamped);
     for time in [0.5, 2.0] {
         let mut found = Vec::new();
         for threads in [1, 2] {

@@ -49,7 +49,7 @@ fn sums_are_infinite_and_their_derivatives_are_refused() {
         assert_eq!(system.energies(&INVERTED).unwrap()[0].energy, Some(f64::INFINITY));
         let state = State { x: &INVERTED, v: &[[0.0; 3]; 4] };
         let weights = Weights { position: -1.0, velocity: 0.0 };
-        let options = LinearisationOptions { weights, curvature: Curvature::Exact, stiffness_times_velocity: false };
+        let options = LinearisationOptions::new(weights, Curvature::Exact);
         let mut matrix = system.matrix();
         let errors = [system.linearise(state, options, &mut matrix).unwrap_err(), system.forces(state).unwrap_err()];
         for error in errors {

@@ -50,10 +50,10 @@ fn check<T: Precision + nalgebra::RealField>(storage: Storage, part: Storage) {
     }
     assert_eq!(stored, sparse.nnz());
     for row in 0..ROWS {
-        for place in bsr.offsets[row]..bsr.offsets[row + 1] {
-            let column = bsr.columns[place];
+        for slot in bsr.offsets[row]..bsr.offsets[row + 1] {
+            let column = bsr.columns[slot];
             assert!(part == Storage::Whole || column >= row);
-            let found = bsr.blocks[place].map(|numbers| numbers.map(Into::<f64>::into));
+            let found = bsr.blocks[slot].map(|numbers| numbers.map(Into::<f64>::into));
             assert_eq!(found, matrix.block(row, column), "block ({row}, {column})");
         }
     }

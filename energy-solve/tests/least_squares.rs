@@ -85,7 +85,8 @@ fn both_solvers_solve() {
         NormalSolverKind::ConjugateGradients { relative_tolerance: 1e-13, iteration_limit: 500 },
     ];
     let [a, b] = kinds.map(|solver| {
-        let options = GaussNewtonOptions { solver, ..GaussNewtonOptions::default() };
+        let mut options = GaussNewtonOptions::default();
+        options.solver = solver;
         let mut newton = GaussNewton::new(chain.pattern.clone(), options).unwrap();
         newton.linearise(&[&chain.links, &chain.anchors], &chain.x).unwrap();
         let (step, _) = newton.solve(1e-3).unwrap();
@@ -139,7 +140,8 @@ fn a_graph_alone_is_singular_and_needs_damping() {
     let mut links = ResidualTerm::<Link, 2>::new("links", Arc::new(Couplings::new(&pattern, &[[0, 1]]).unwrap()), 1.0);
     links.set_elements([Placed { element: Link::new(1.0), stencil: 0, weight: 1.0 }]);
     // Three rows for four unknowns: a factor needs damping, so the iteration must increase it.
-    let options = GaussNewtonOptions { damping: 0.0, ..GaussNewtonOptions::default() };
+    let mut options = GaussNewtonOptions::default();
+    options.damping = 0.0;
     let mut solver = GaussNewton::new(pattern, options).unwrap();
     let mut x = [[0.0, 0.0], [2.0, 0.5]];
     let report = solver.iterate(&[&links], &mut x).unwrap();

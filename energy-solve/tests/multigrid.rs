@@ -14,7 +14,7 @@ use nalgebra::{DMatrix, DVector};
 fn sheet(cells: usize, stiffness: f64) -> BlockMatrix {
     let vertex = |i: usize, j: usize| (j * (cells + 1) + i) as u32;
     let rows = (cells + 1) * (cells + 1);
-    let place = |v: u32| {
+    let row = |v: u32| {
         let (i, j) = (v as usize % (cells + 1), v as usize / (cells + 1));
         let [x, y] = [i, j].map(|k| k as f64 / cells as f64);
         [x, y, 0.05 * (7.0 * x + 3.0 * y).sin() + 0.02 * (23.0 * y).cos()]
@@ -37,10 +37,10 @@ fn sheet(cells: usize, stiffness: f64) -> BlockMatrix {
         }
     }
     for ([a, b], k) in links {
-        let (p, q) = (place(a), place(b));
+        let (p, q) = (row(a), row(b));
         let d: Vector3<f64> = std::array::from_fn(|axis| q[axis] - p[axis]);
         let square: f64 = d.iter().map(|x| x * x).sum();
-        let (slot, _) = pattern.place(a as usize, b as usize).unwrap();
+        let (slot, _) = pattern.slot(a as usize, b as usize).unwrap();
         for i in 0..3 {
             for j in 0..3 {
                 let entry = k * d[i] * d[j] / square + if i == j { 0.02 } else { 0.0 };
@@ -64,7 +64,7 @@ fn solved<T: Precision>(matrix: &BlockMatrix, tolerance: f64, threads: usize) ->
     multigrid.take_over(matrix).unwrap();
     let b = load(matrix.pattern().rows());
     let mut x = vec![[0.0; 3]; b.len()];
-    let options = SolveOptions { relative_tolerance: tolerance, iteration_limit: 200 };
+    let options = SolveOptions::new(tolerance).with_iteration_limit(200);
     let report = multigrid.solve(&b, &mut x, &options);
     (x, report)
 }
@@ -84,7 +84,7 @@ fn iterations_hardly_grow_with_the_mesh() {
         let mut relaxed = OverRelaxation::<f32>::new(matrix.pattern());
         relaxed.scale(&matrix).unwrap();
         let b = load(matrix.pattern().rows());
-        let options = SolveOptions { relative_tolerance: 1e-3, ..SolveOptions::default() };
+        let options = SolveOptions::new(1e-3);
         let relaxed = relaxed.solve(&b, &mut vec![[0.0; 3]; b.len()], &options);
         assert!(multigrid.converged() && relaxed.converged(), "{multigrid:?} {relaxed:?}");
         [multigrid.iterations, relaxed.iterations]
@@ -135,9 +135,9 @@ fn multigrid_solves_for_any_order_of_rows() {
     let mut shuffled = BlockMatrix::zeros(Arc::clone(&pattern));
     for row in 0..rows {
         for (slot, column) in matrix.pattern().row(row) {
-            let (place, turned) = pattern.place(moved(row), moved(column)).unwrap();
+            let (new_slot, turned) = pattern.slot(moved(row), moved(column)).unwrap();
             let block = matrix.values()[slot];
-            shuffled.values_mut()[place] =
+            shuffled.values_mut()[new_slot] =
                 std::array::from_fn(|i| std::array::from_fn(|j| if turned { block[j][i] } else { block[i][j] }));
         }
     }
@@ -158,8 +158,8 @@ fn small_and_disconnected_matrices() {
             *matrix.diagonal_mut(row) = [[2.0, 0.5, 0.0], [0.5, 3.0, 0.1], [0.0, 0.1, 4.0 + row as f64]];
         }
         for [a, b] in &pairs {
-            let (place, _) = pattern.place(*a as usize, *b as usize).unwrap();
-            matrix.values_mut()[place] = [[-1.0, 0.2, 0.0], [0.0, -0.5, 0.0], [0.1, 0.0, -1.0]];
+            let (slot, _) = pattern.slot(*a as usize, *b as usize).unwrap();
+            matrix.values_mut()[slot] = [[-1.0, 0.2, 0.0], [0.0, -0.5, 0.0], [0.1, 0.0, -1.0]];
         }
         let (x, report) = solved::<f64>(&matrix, 1e-12, 2);
         assert!(report.converged() && report.iterations < 20, "{rows} rows: {report:?}");

@@ -26,12 +26,12 @@ fn matrix(diagonal: f64, skew: f64) -> BlockMatrix {
         (seed >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
     };
     for row in 0..ROWS {
-        for column in (row..ROWS).filter(|&column| pattern.place(row, column).is_some()) {
+        for column in (row..ROWS).filter(|&column| pattern.slot(row, column).is_some()) {
             for i in 0..3 {
                 for j in if row == column { i } else { 0 }..3 {
                     let entry = number() + if (row, i) == (column, j) { diagonal } else { 0.0 };
                     let [(upper, _), (lower, turned)] =
-                        [(row, column), (column, row)].map(|(row, column)| pattern.place(row, column).unwrap());
+                        [(row, column), (column, row)].map(|(row, column)| pattern.slot(row, column).unwrap());
                     matrix.values_mut()[upper][i][j] = entry + skew;
                     if !turned {
                         matrix.values_mut()[lower][j][i] = entry;
@@ -83,7 +83,7 @@ fn solve(
 
 fn assert_solves(solver: Solver, matrix: &BlockMatrix) {
     let b = right_hand_side();
-    let options = SolveOptions { relative_tolerance: 1e-12, ..SolveOptions::default() };
+    let options = SolveOptions::new(1e-12);
     let (x, report) = solve(solver, matrix, &b, &options);
     assert!(report.converged(), "{report:?}");
     let expected = dense(matrix).lu().solve(&DVector::from_iterator(3 * ROWS, b.into_iter().flatten())).unwrap();
@@ -107,7 +107,7 @@ fn tolerance_is_relative_to_the_right_hand_side() {
     let matrix = matrix(6.0, 0.0);
     let b = right_hand_side();
     let tiny: Vec<_> = b.iter().map(|row| row.map(|entry| entry * 2.0_f64.powi(-200))).collect();
-    let options = SolveOptions { relative_tolerance: 1e-6, ..SolveOptions::default() };
+    let options = SolveOptions::new(1e-6);
     for solver in [over_relaxation as Solver, bicgstab] {
         let ((x, whole), (y, scaled)) = (solve(solver, &matrix, &b, &options), solve(solver, &matrix, &tiny, &options));
         assert_eq!(whole.iterations, scaled.iterations);
@@ -124,7 +124,7 @@ fn indefinite_curvature_is_reported() {
         *linked.diagonal_mut(row) = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
         for column in [row.wrapping_sub(1), row + 1] {
             if column < ROWS {
-                let slot = linked.pattern().place(row, column).unwrap().0;
+                let slot = linked.pattern().slot(row, column).unwrap().0;
                 linked.values_mut()[slot][0][0] = -2.0;
             }
         }
@@ -142,7 +142,7 @@ fn a_breakdown_of_the_recurrence_is_reported() {
     for axis in 0..3 {
         matrix.diagonal_mut(0)[axis][axis] = 1.0;
         matrix.diagonal_mut(1)[axis][axis] = 1.0;
-        matrix.values_mut()[pattern.place(0, 1).unwrap().0][axis][axis] = -2.0;
+        matrix.values_mut()[pattern.slot(0, 1).unwrap().0][axis][axis] = -2.0;
     }
     let (x, report) = solve(bicgstab, &matrix, &[[1.0; 3]; 2], &SolveOptions::default());
     assert_eq!((report.stopped, report.iterations), (StopReason::Breakdown, 0));
@@ -152,7 +152,7 @@ fn a_breakdown_of_the_recurrence_is_reported() {
 #[test]
 fn limits_zero_loads_and_broken_numbers_are_reported() {
     let matrix = matrix(6.0, 0.0);
-    let few = SolveOptions { relative_tolerance: 1e-14, iteration_limit: 2 };
+    let few = SolveOptions::new(1e-14).with_iteration_limit(2);
     let mut broken = right_hand_side();
     broken[3][1] = f64::NAN;
     for solver in [over_relaxation as Solver, bicgstab] {
@@ -202,7 +202,7 @@ fn an_indefinite_strand_has_no_factor() {
     for row in 0..ROWS {
         *linked.diagonal_mut(row) = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
     }
-    let (slot, _) = linked.pattern().place(0, 1).unwrap();
+    let (slot, _) = linked.pattern().slot(0, 1).unwrap();
     linked.values_mut()[slot] = [[-1.2, 0.0, 0.0], [0.0; 3], [0.0; 3]];
     let mut factor = BlockCholesky::new(linked.pattern()).unwrap();
     assert_eq!(factor.factor(&linked), Err(CholeskyError::NotPositiveDefinite));
@@ -226,7 +226,7 @@ fn sheet(side: usize) -> BlockMatrix {
         *matrix.diagonal_mut(row) = [[0.01, 0.0, 0.0], [0.0, 0.01, 0.0], [0.0, 0.0, 0.01]];
     }
     for [p, q] in links.iter().map(|link| link.map(|vertex| vertex as usize)) {
-        let (slot, _) = matrix.pattern().place(p, q).unwrap();
+        let (slot, _) = matrix.pattern().slot(p, q).unwrap();
         for axis in 0..3 {
             let stiffness = [1.0, 0.7, 0.1][axis];
             matrix.diagonal_mut(p)[axis][axis] += stiffness;
@@ -244,7 +244,7 @@ fn relaxed<T: Precision>(matrix: &BlockMatrix, scale: f64, tolerance: f64) -> (V
     solver.scale(matrix).unwrap();
     let b: Vec<_> = (0..rows).map(|row| [row as f64, 1.0, 0.1 * row as f64].map(|phase| scale * phase.cos())).collect();
     let mut x = vec![[0.0; 3]; rows];
-    let options = SolveOptions { relative_tolerance: tolerance, ..SolveOptions::default() };
+    let options = SolveOptions::new(tolerance);
     let report = solver.solve(&b, &mut x, &options);
     assert!(report.converged(), "{report:?}");
     (x, report)
@@ -257,7 +257,7 @@ fn over_relaxation_saves_iterations_and_serves_in_single_precision() {
     let (rounded, single) = relaxed::<f32>(&matrix, 1.0, 1e-3);
     assert!(double.iterations.abs_diff(single.iterations) <= 1, "{double:?} {single:?}");
     let b: Vec<_> = (0..64 * 64).map(|row| [row as f64, 1.0, 0.1 * row as f64].map(f64::cos)).collect();
-    let options = SolveOptions { relative_tolerance: 1e-3, ..SolveOptions::default() };
+    let options = SolveOptions::new(1e-3);
     // An iteration of BiCGSTAB takes two products with the matrix.
     let (_, unrelaxed) = solve(bicgstab, &matrix, &b, &options);
     let [few, many] = [double.iterations, 2 * unrelaxed.iterations];
@@ -283,7 +283,7 @@ fn single_precision_suffices_in_any_unit() {
 
 #[test]
 fn over_relaxation_says_why_it_stops() {
-    let options = SolveOptions { relative_tolerance: 1e-10, iteration_limit: 2 };
+    let options = SolveOptions::new(1e-10).with_iteration_limit(2);
     let good = matrix(6.0, 0.0);
     let mut solver = OverRelaxation::<f64>::new(good.pattern());
     solver.scale(&good).unwrap();

@@ -119,9 +119,9 @@ fn sums(read: bool, threads: usize, curvature: Curvature, is_restricted: bool) -
     let forces = system.forces(state).unwrap();
     let mut matrix = system.matrix();
     let weights = Weights { position: -1e-4, velocity: -1e-2 };
-    let options = LinearisationOptions { weights, curvature, stiffness_times_velocity: true };
+    let options = LinearisationOptions::new(weights, curvature).with_stiffness_times_velocity(true);
     let product = system.linearise(state, options, &mut matrix).unwrap().stiffness_times_velocity;
-    let options = LinearisationOptions { stiffness_times_velocity: false, ..options };
+    let options = options.with_stiffness_times_velocity(false);
     let linear = system.linearise(state, options, &mut matrix).unwrap().force;
     let counts = system.terms().map(|(_, counts)| counts).collect();
     Sums { energies, elements, forces, linear, product, blocks: matrix.values().to_vec(), counts }
@@ -183,8 +183,8 @@ impl OwnLaw for OwnSprings {
                 }
                 if order == Order::Jacobians {
                     for (i, j) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
-                        let place = 36 * element + 6 * (3 * i + axis) + 3 * j + axis;
-                        results.by_position[place] = if i == j { -k } else { *k };
+                        let entry = 36 * element + 6 * (3 * i + axis) + 3 * j + axis;
+                        results.by_position[entry] = if i == j { -k } else { *k };
                     }
                 }
             }
@@ -202,7 +202,7 @@ fn summed(term: Box<dyn Term>, curvature: Curvature) -> Summed {
     let mut system = System::new(vec![term], &[false, true, false, false, false]).unwrap();
     let mut matrix = system.matrix();
     let weights = Weights { position: -1.0, velocity: 0.0 };
-    let options = LinearisationOptions { weights, curvature, stiffness_times_velocity: false };
+    let options = LinearisationOptions::new(weights, curvature);
     let force = system.linearise(State { x: &x, v: &v }, options, &mut matrix).unwrap().force;
     let energy = system.energies(&x).unwrap()[0].energy.unwrap();
     (energy, force, matrix.to_triplets(Storage::Whole))

@@ -66,9 +66,9 @@ fn sums(threads: usize) -> Sums {
     let forces = system.forces(state).unwrap();
     let mut matrix = system.matrix();
     let weights = Weights { position: -1e-4, velocity: -1e-2 };
-    let options = LinearisationOptions { weights, curvature: Curvature::Clamped, stiffness_times_velocity: true };
+    let options = LinearisationOptions::new(weights, Curvature::Clamped).with_stiffness_times_velocity(true);
     let product = system.linearise(state, options, &mut matrix).unwrap().stiffness_times_velocity;
-    let options = LinearisationOptions { stiffness_times_velocity: false, ..options };
+    let options = options.with_stiffness_times_velocity(false);
     let linear = system.linearise(state, options, &mut matrix).unwrap().force;
     let counts = system.terms().map(|(_, counts)| counts).collect();
     Sums { energies, forces, linear, product, blocks: matrix.values().to_vec(), counts, matrix }
@@ -96,7 +96,7 @@ fn solution<T: Precision>(matrix: &BlockMatrix, threads: usize) -> (Vec<Vector3<
     solver.scale(&matrix).unwrap();
     let b: Vec<Vector3<f64>> = (0..rows).map(|row| [row as f64, 1.0, 0.1 * row as f64].map(f64::cos)).collect();
     let mut x = vec![[0.0; 3]; rows];
-    let options = SolveOptions { relative_tolerance: 1e-3, ..SolveOptions::default() };
+    let options = SolveOptions::new(1e-3);
     let report = solver.solve(&b, &mut x, &options);
     assert!(report.converged(), "{report:?}");
     (x, report.iterations)

@@ -112,7 +112,8 @@ fn measure(vertices: usize, nodes: usize, k: usize) {
         ),
     ];
     for (name, solver) in solvers {
-        let options = GaussNewtonOptions { solver, ..GaussNewtonOptions::default() };
+        let mut options = GaussNewtonOptions::default();
+        options.solver = solver;
         let mut newton = GaussNewton::<6>::new(energy.pattern().clone(), options).expect("memory suffices");
         let terms = energy.terms();
         let assembled = median(|| {

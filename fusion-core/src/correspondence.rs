@@ -31,6 +31,7 @@ impl Default for Gates {
 
 /// Number of vertices by the result of their search.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct MatchCounts {
     /// Matched vertices.
     pub matched: usize,

@@ -7,6 +7,7 @@ use serde::de::DeserializeOwned;
 
 /// A JSON file that cannot be read or written.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum JsonFileError {
     /// The file cannot be read or written.
     #[error("{}", .path.display())]

@@ -5,6 +5,7 @@ use std::fmt::Display;
 /// An option with a value that cannot be used.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("option `{name}`: expected {expected}, got {found}")]
+#[non_exhaustive]
 pub struct OptionError {
     /// Path of the option in a file of options.
     pub name: &'static str,

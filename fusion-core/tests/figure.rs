@@ -191,7 +191,8 @@ fn nodes_attached_to_the_nearest_bones_are_all_reached() {
 fn bones_as_unknowns_add_their_blocks() {
     let model = DeformationModel::new(&figure(), ModelOptions::default()).unwrap();
     let known = FusionEnergy::new(&model, EnergyOptions::default()).unwrap();
-    let options = EnergyOptions { bones: BoneMode::Unknown, ..EnergyOptions::default() };
+    let mut options = EnergyOptions::default();
+    options.bones = BoneMode::Unknown;
     let unknown = FusionEnergy::new(&model, options).unwrap();
     assert_eq!(unknown.pattern().rows(), known.pattern().rows() + 16);
     let names: Vec<&str> = unknown.terms().iter().map(|term| term.name()).collect();

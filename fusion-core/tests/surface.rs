@@ -95,8 +95,12 @@ fn without_images_the_surface_is_that_of_the_model() {
 fn a_grid_that_is_too_fine_is_refused() {
     let model = DeformationModel::new(&figure(), ModelOptions::default()).unwrap();
     let refused = |options| SurfaceVolume::new(&model, options).unwrap_err().to_string();
-    let fine = refused(SurfaceOptions { voxel: 1e-4, ..SurfaceOptions::default() });
+    let mut options = SurfaceOptions::default();
+    options.voxel = 1e-4;
+    let fine = refused(options);
     assert!(fine.contains("voxels of 0.1 mm") && fine.contains("increase `surface.voxel`"), "{fine}");
-    let near = refused(SurfaceOptions { reach: 0.01, ..SurfaceOptions::default() });
+    let mut options = SurfaceOptions::default();
+    options.reach = 0.01;
+    let near = refused(options);
     assert!(near.contains("surface.reach"), "{near}");
 }

@@ -154,6 +154,7 @@ impl Answer {
 
 /// The reason why an element has no usable result.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum NoAnswer {
     /// The rest shape is degenerate.
     #[error(transparent)]

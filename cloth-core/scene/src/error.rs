@@ -3,6 +3,7 @@ use std::path::{Path, PathBuf};
 /// A scene file that cannot be used.
 #[derive(Debug, thiserror::Error)]
 #[expect(missing_docs, reason = "the messages name the fields")]
+#[non_exhaustive]
 pub enum SceneError {
     /// The file cannot be read.
     #[error("cannot read the scene {}", .path.display())]

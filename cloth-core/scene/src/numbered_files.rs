@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 /// Numbers of files that are no sequence.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum NumberingError {
     /// A number is missing.
     #[error(

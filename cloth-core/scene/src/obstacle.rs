@@ -159,6 +159,7 @@ struct MeshKeys {
 /// A mesh that cannot be an obstacle.
 #[derive(Debug, thiserror::Error)]
 #[expect(missing_docs, reason = "the messages name the fields")]
+#[non_exhaustive]
 pub enum ObstacleError {
     /// The OBJ file is invalid.
     #[error("{name}: {source}")]

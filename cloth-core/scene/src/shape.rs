@@ -16,6 +16,7 @@ use cloth_physics::mesh::{
 /// A mesh that cannot be built.
 #[derive(Debug, thiserror::Error)]
 #[expect(missing_docs, reason = "the messages name the fields")]
+#[non_exhaustive]
 pub enum MeshSourceError {
     /// The OBJ file is invalid.
     #[error(transparent)]
@@ -101,7 +102,8 @@ impl Mesh {
             Self::Strip(strip) => Source::built(strip.sheet().mesh()?),
             Self::Disc(disc) => Source::built(disc.mesh()?),
             Self::Obj { path, groups, weld } => {
-                let options = ObjOptions { groups: groups.as_deref(), weld: *weld };
+                let mut options = ObjOptions::default();
+                (options.groups, options.weld) = (groups.as_deref(), *weld);
                 let surface = read_obj_surface(&folder.join(path), options)?;
                 Source {
                     mesh: surface.mesh,
@@ -169,7 +171,9 @@ impl Garment {
     /// Reads the rest shape of each triangle from a file.
     fn patterns_from(&self, path: &Path, source: &Source) -> Result<Vec<[Vector3<f64>; 3]>, MeshSourceError> {
         let groups = if let Mesh::Obj { groups, .. } = &self.mesh { groups.as_deref() } else { None };
-        let rest = read_obj_surface(path, ObjOptions { groups, weld: None })?.mesh;
+        let mut options = ObjOptions::default();
+        options.groups = groups;
+        let rest = read_obj_surface(path, options)?.mesh;
         let (expected, found) = (source.unwelded, rest.triangles().len());
         if expected != found {
             return Err(MeshSourceError::OtherFaces { path: path.to_owned(), expected, found });

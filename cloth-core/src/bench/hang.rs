@@ -45,6 +45,7 @@ impl Cloth {
 /// A scene of the benchmark that cannot be set up or run.
 #[derive(Debug, thiserror::Error)]
 #[expect(missing_docs, reason = "the messages name the fields")]
+#[non_exhaustive]
 pub enum BenchError {
     /// The mesh is invalid.
     #[error(transparent)]

@@ -50,6 +50,7 @@ impl Ratio {
 
 /// A scene of the benchmark that cannot be set up or run.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum SleepBenchError {
     /// The scene is invalid.
     #[error(transparent)]

@@ -36,7 +36,7 @@ pub fn table(runs: &[Measured]) -> Table {
         let milliseconds = |time: Duration| time.as_secs_f64() * 1e3;
         let step_time = |run: &Measured| 1e3 * run.step_time();
         let share = |time: Duration| format!("{:.0} %", 100.0 * time.as_secs_f64() / run.time.as_secs_f64());
-        let Phases { assembly, factorisation, solve, line_search, collision } = run.report.phases;
+        let Phases { assembly, factorisation, solve, line_search, collision, .. } = run.report.phases;
         let comparable = runs.iter().filter(|other| other.kind() == run.kind());
         let smaller = comparable.filter(|other| other.vertices < run.vertices);
         let before = smaller.max_by_key(|other| other.vertices);

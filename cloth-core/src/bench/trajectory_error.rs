@@ -29,6 +29,7 @@ pub struct Run {
 
 /// A comparison that could not be made.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum ComparisonError {
     /// The scene cannot be set up.
     #[error(transparent)]

@@ -20,7 +20,8 @@ impl Demo {
     pub fn run(self) -> Result<ExitCode> {
         let scene = demo::scene()?;
         print(&format!("{}\n", demo::audit_materials(&Simulation::new(&scene)?)?))?;
-        let options = RunOptions { overwrite: true, ..RunOptions::default() };
+        let mut options = RunOptions::default();
+        options.overwrite = true;
         let run = Run::new(demo::SCENE.to_owned(), "scenes/hang.toml".as_ref(), &self.output, options)?;
         simulate(run, false, LogChoice::Text)
     }

@@ -71,7 +71,9 @@ impl RunScene {
         let Some(output) = output.filter(|_| !self.dry_run) else {
             return dry_run(&text, &scene, threads, log);
         };
-        let options = RunOptions { overwrite, checkpoint_interval: checkpoint, ignore_memory };
+        let mut options = RunOptions::default();
+        (options.overwrite, options.checkpoint_interval, options.ignore_memory) =
+            (overwrite, checkpoint, ignore_memory);
         let run = Run::new(text, &scene, &output, options).map_err(|error| match error {
             RunError::Simulation(error) => anyhow::Error::new(error).context(scene.display().to_string()),
             located => located.into(),

@@ -98,7 +98,8 @@ impl Sweep {
         if done.symlink_metadata().is_ok_and(|done| done.is_file()) {
             return Ok(());
         }
-        let options = RunOptions { overwrite: true, checkpoint_interval: Some(self.checkpoint), ignore_memory: false };
+        let mut options = RunOptions::default();
+        (options.overwrite, options.checkpoint_interval) = (true, Some(self.checkpoint));
         let start = || Run::new(choice.text.clone(), &self.scene, &folder, options);
         let has_state =
             [OutputFolder::CHECKPOINT, OutputFolder::PREVIOUS_CHECKPOINT].map(|name| folder.join(name).exists());

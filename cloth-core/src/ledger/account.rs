@@ -78,7 +78,7 @@ impl Account {
     /// Starts a step, after the terms were told of it. The first `own` vertices are those of the island, the others
     /// those of obstacles. `obstacles` is the power of moving obstacles that have no vertices, in W.
     pub(crate) fn begin(&self, body: &Body, own: usize, obstacles: f64) -> Opening {
-        let moves = |vertex: &usize| body.system.dofs().place(*vertex).is_none() && body.v[*vertex] != [0.0; 3];
+        let moves = |vertex: &usize| body.system.dofs().row(*vertex).is_none() && body.v[*vertex] != [0.0; 3];
         let moving: Vec<usize> = (0..body.x.len()).filter(moves).collect();
         let forces = potential_forces(body, &moving).into_iter();
         let pins = moving.iter().zip(forces).map(|(&vertex, force)| (vertex, force, body.x[vertex])).collect();

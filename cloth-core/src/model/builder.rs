@@ -15,7 +15,7 @@ use super::seam::Side;
 use super::soft_pin::{Held, SoftPinTerm};
 use super::{PinError, SeamError, pins, seam};
 use crate::contact::AnySolid;
-use crate::fabric::{self, Hair, Place, StitchDamping, Surroundings};
+use crate::fabric::{self, Hair, StitchDamping, Surroundings, SystemPart};
 use crate::geometry::{Pose, add_scaled, norm, subtract};
 use crate::mesh::{CornerAttributes, DisjointSets, SpringNetwork, Topology, TriangleMesh};
 use crate::motion::Motion;
@@ -55,7 +55,7 @@ const SMALL_PIECE: usize = 64;
 
 /// How a vertex is held.
 #[derive(Clone, Copy)]
-struct Hold {
+struct Attachment {
     /// An index into [`Model::motions`]; `None` if the vertex is fixed.
     motion: Option<usize>,
     /// Whether the motion is that of an obstacle, which the vertex follows from where it is.
@@ -221,16 +221,16 @@ impl<'a> Builder<'a> {
     }
 
     /// Returns the island of a piece, the piece's offset within it, and the prefix of its terms' names.
-    fn place(&self, piece: &Piece) -> (usize, Place) {
+    fn island_of(&self, piece: &Piece) -> (usize, SystemPart) {
         let part = &self.model.parts[piece.part];
         let Home { island, place } = self.homes[part.vertices.start + piece.vertices[0]];
         let prefix = if self.prefix_names { format!("{}: ", part.name) } else { String::new() };
-        (island, Place { first: place, prefix })
+        (island, SystemPart { first: place, prefix })
     }
 
     /// Adds the terms of a fabric on a piece. `since` is the number of labels before its part.
     fn add_applied(&mut self, piece: &Piece, since: usize, applied: fabric::FabricTerms) {
-        let (island, _) = self.place(piece);
+        let (island, _) = self.island_of(piece);
         let first = self.model.parts[piece.part].vertices.start;
         piece.vertices.iter().zip(applied.masses).for_each(|(vertex, mass)| self.model.masses[first + vertex] = mass);
         applied.terms.into_iter().for_each(|term| self.add_term(island, since, term));
@@ -272,9 +272,9 @@ impl<'a> Builder<'a> {
     ) -> Result<fabric::FabricTerms, ModelError> {
         let part = &self.model.parts[piece.part];
         let PartKind::Cloth(mesh) = &part.kind else { unreachable!("garments come before hair") };
-        let (_, place) = self.place(piece);
+        let (_, in_island) = self.island_of(piece);
         let apply = |mesh: &TriangleMesh, springs: &SpringNetwork| {
-            fabric::terms_at(&garment.fabric, mesh, springs, &self.surroundings(), place.clone())
+            fabric::terms_at(&garment.fabric, mesh, springs, &self.surroundings(), in_island.clone())
         };
         let applied = if is_whole {
             apply(mesh, springs)
@@ -290,7 +290,7 @@ impl<'a> Builder<'a> {
         for (number, hair) in self.scene.hair.iter().enumerate() {
             let (part, since) = (self.scene.garments.len() + number, self.model.labels.len());
             for piece in self.take_pieces(part) {
-                let applied = fabric::hair_terms(hair, &self.surroundings(), self.place(&piece).1);
+                let applied = fabric::hair_terms(hair, &self.surroundings(), self.island_of(&piece).1);
                 let name = || self.model.parts[part].name.clone();
                 let applied = applied.map_err(|source| ModelError::Fabric { part: name(), source })?;
                 self.add_applied(&piece, since, applied);
@@ -385,7 +385,7 @@ impl<'a> Builder<'a> {
     }
 
     fn pin(&mut self) -> Result<(), ModelError> {
-        let mut held: BTreeMap<usize, Hold> = BTreeMap::new();
+        let mut held: BTreeMap<usize, Attachment> = BTreeMap::new();
         for (pin, description) in self.scene.pins.iter().enumerate() {
             let motion = self.motion_of(pin, description)?;
             let chosen = self.chosen(pin, description)?;
@@ -394,23 +394,23 @@ impl<'a> Builder<'a> {
                 continue;
             }
             let motion = motion.map(|motion| self.add_motion(motion));
-            let shared = Hold { motion, follows: description.obstacle.is_some(), release: description.release };
+            let shared = Attachment { motion, follows: description.obstacle.is_some(), release: description.release };
             for vertex in chosen {
                 let carried = self.carried(description, vertex).map(|motion| self.add_motion(motion));
-                let hold = Hold { motion: carried.or(motion), ..shared };
-                let known = held.get(&vertex).copied().unwrap_or(hold);
-                if !self.move_alike(known, hold) {
+                let attachment = Attachment { motion: carried.or(motion), ..shared };
+                let known = held.get(&vertex).copied().unwrap_or(attachment);
+                if !self.move_alike(known, attachment) {
                     return Err(PinError::Twice { pin, vertex }.into());
                 }
                 // The last pin to let go frees the vertex.
-                let release = known.release.zip(hold.release).map(|(one, other)| one.max(other));
-                held.insert(vertex, Hold { release, ..known });
+                let release = known.release.zip(attachment.release).map(|(one, other)| one.max(other));
+                held.insert(vertex, Attachment { release, ..known });
             }
         }
         for vertex in self.roots() {
-            held.entry(vertex).or_insert(Hold { motion: None, follows: false, release: None }).release = None;
+            held.entry(vertex).or_insert(Attachment { motion: None, follows: false, release: None }).release = None;
         }
-        self.hold(held);
+        self.attach(held);
         Ok(())
     }
 
@@ -442,29 +442,30 @@ impl<'a> Builder<'a> {
         }
     }
 
-    /// Whether two holds prescribe the same motion.
-    fn move_alike(&self, one: Hold, other: Hold) -> bool {
-        let of = |hold: Hold| hold.motion.map(|number| (&self.model.motions[number], hold.follows));
+    /// Whether two attachments prescribe the same motion.
+    fn move_alike(&self, one: Attachment, other: Attachment) -> bool {
+        let of = |one: Attachment| one.motion.map(|number| (&self.model.motions[number], one.follows));
         of(one) == of(other)
     }
 
     /// Pins vertices that are not yet released, and moves those with a motion to its start.
-    fn hold(&mut self, held: BTreeMap<usize, Hold>) {
+    fn attach(&mut self, held: BTreeMap<usize, Attachment>) {
         let (model, now) = (&mut self.model, self.time);
-        let is_fixed = |hold: &Hold| hold.release.is_none();
-        let is_held = |hold: &Hold| hold.release.is_none_or(|release| release > now);
-        let marked = |is_marked: &dyn Fn(&Hold) -> bool| -> Vec<bool> {
+        let is_fixed = |one: &Attachment| one.release.is_none();
+        let is_held = |one: &Attachment| one.release.is_none_or(|release| release > now);
+        let marked = |is_marked: &dyn Fn(&Attachment) -> bool| -> Vec<bool> {
             (0..model.x.len()).map(|vertex| held.get(&vertex).is_some_and(is_marked)).collect()
         };
         let all = [marked(&|_| true), marked(&is_fixed), marked(&is_held)];
         [model.pinned_at_start, model.pinned_forever, model.pinned] = all;
-        for (vertex, hold) in held {
+        for (vertex, attachment) in held {
             model.v[vertex] = [0.0; 3];
-            if let Some(motion) = hold.motion {
+            if let Some(motion) = attachment.motion {
                 let start = model.motions[motion].pose(0.0);
                 // Vertices on an obstacle stay where they are at the start.
-                let initial = if hold.follows { start.inverse_transform(model.x[vertex]) } else { model.x[vertex] };
-                if is_held(&hold) {
+                let initial =
+                    if attachment.follows { start.inverse_transform(model.x[vertex]) } else { model.x[vertex] };
+                if is_held(&attachment) {
                     model.moving.push(MovingPin { vertex, initial, motion });
                 }
                 model.x[vertex] = start.transform(initial);

@@ -11,6 +11,7 @@ use crate::scene::{ContactChoice, Exclusion};
 /// An exclusion that is invalid.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[expect(missing_docs, reason = "the messages name the fields")]
+#[non_exhaustive]
 pub enum ExclusionError {
     /// A name belongs to nothing.
     #[error("exclude[{exclusion}]: nothing is called `{name}`; there are {}", .known.join(", "))]
@@ -139,6 +140,6 @@ pub(super) fn hold(exclusions: &mut Exclusions, obstacles: &[Obstacle], x: &[Vec
         let solid = obstacle.at(0.0);
         let is_near = |vertex: &usize| solid.signed_distance(x[*vertex]) < obstacle.thickness;
         let held = (0..x.len()).filter(|&vertex| is_pinned[vertex]).filter(is_near);
-        held.for_each(|vertex| exclusions.hold(vertex, number));
+        held.for_each(|vertex| exclusions.attach(vertex, number));
     }
 }

@@ -33,6 +33,7 @@ impl DrivenLaw for PressureLaw {
 /// A mesh that encloses no volume.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[expect(missing_docs, reason = "the messages name the fields")]
+#[non_exhaustive]
 pub enum NotClosed {
     /// The mesh has a boundary.
     #[error(

@@ -129,6 +129,7 @@ pub struct Model {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("there is no garment or hair called `{name}`; there are {}", .known.join(", "))]
 #[expect(missing_docs, reason = "the messages name the fields")]
+#[non_exhaustive]
 pub struct UnknownPart {
     pub name: String,
     /// The existing names.
@@ -138,6 +139,7 @@ pub struct UnknownPart {
 /// A scene whose parts do not fit together.
 #[derive(Debug, thiserror::Error)]
 #[expect(missing_docs, reason = "the messages name the fields")]
+#[non_exhaustive]
 pub enum ModelError {
     /// The mesh of a garment is invalid.
     #[error("{part}: {source}")]

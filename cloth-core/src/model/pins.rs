@@ -9,6 +9,7 @@ use crate::scene::{Pin, PinBox, PinChoice};
 /// A pin that is invalid.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[expect(missing_docs, reason = "the messages name the fields")]
+#[non_exhaustive]
 pub enum PinError {
     /// `of` refers to an unknown part.
     #[error("pins[{pin}]: {0}", .error)]

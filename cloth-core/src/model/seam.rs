@@ -9,6 +9,7 @@ use crate::scene::Seam;
 /// A seam that is invalid.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[expect(missing_docs, reason = "the messages name the fields")]
+#[non_exhaustive]
 pub enum SeamError {
     /// A garment does not exist.
     #[error("seams[{seam}]: {0}", .error)]

@@ -94,7 +94,7 @@ impl TermDescription for SoftPinTerm {
 
 impl Term for SoftPinTerm {
     fn place(mut self: Box<Self>, dofs: &DofMap, pattern: &Pattern) -> Box<dyn PlacedTerm> {
-        let slot = |held: &Held| dofs.place(held.vertex).map(|row| pattern.diagonal(row));
+        let slot = |held: &Held| dofs.row(held.vertex).map(|row| pattern.diagonal(row));
         self.slots = self.held.iter().map(slot).collect();
         self
     }

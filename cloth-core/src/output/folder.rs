@@ -6,6 +6,7 @@ use energy_files::{FolderLock, LockError, PartFile, create_folder, remove_file, 
 /// A folder or file that cannot be written.
 #[derive(Debug, thiserror::Error)]
 #[expect(missing_docs, reason = "the messages name the fields")]
+#[non_exhaustive]
 pub enum OutputError {
     /// The folder cannot be created or written to.
     #[error("cannot write to the folder {}; choose another with -o", .path.display())]
@@ -28,7 +29,7 @@ impl From<LockError> for OutputError {
     fn from(error: LockError) -> Self {
         match error {
             LockError::File { path, source } => Self::File { path, source },
-            in_use @ LockError::InUse { .. } => Self::InUse(in_use),
+            in_use => Self::InUse(in_use),
         }
     }
 }

@@ -24,6 +24,7 @@ const THINNEST: f64 = 1.5;
 /// A picture that cannot be encoded.
 #[derive(Debug, thiserror::Error)]
 #[error("cannot draw the picture: {0}")]
+#[non_exhaustive]
 pub struct PictureError(String);
 
 /// Direction from the cloth to the lamp.

@@ -34,6 +34,7 @@ pub struct Checkpoint {
 /// A checkpoint that cannot be used.
 #[derive(Debug, thiserror::Error)]
 #[expect(missing_docs, reason = "the messages name the fields")]
+#[non_exhaustive]
 pub enum CheckpointError {
     /// The file cannot be read.
     #[error("cannot read the checkpoint {}; was the run started with --checkpoint?", .path.display())]
@@ -111,6 +112,7 @@ impl Checkpoint {
             }
             SealError::OtherVersion(version) => CheckpointError::Older { path: path.clone(), version },
             SealError::Damaged(reason) => damaged(reason),
+            other => damaged(&other.to_string()),
         })?;
         serde_json::from_slice(body).map_err(|error| damaged(&error.to_string()))
     }

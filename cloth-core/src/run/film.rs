@@ -12,6 +12,7 @@ use crate::output::OutputFolder;
 
 /// A film that cannot be written.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum FilmError {
     /// A picture cannot be read.
     #[error("cannot read the picture {}: {reason}", .path.display())]

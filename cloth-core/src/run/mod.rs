@@ -41,6 +41,7 @@ use memory_need::Gigabytes;
 
 /// A run that cannot be started or completed.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum RunError {
     /// The scene is invalid.
     #[error(transparent)]
@@ -95,6 +96,7 @@ pub enum RunError {
 
 /// How to start a run.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct RunOptions {
     /// Whether to replace the files of an earlier run.
     pub overwrite: bool,

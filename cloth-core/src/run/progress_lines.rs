@@ -90,7 +90,8 @@ mod tests {
     fn lines_come_at_intervals_with_the_time_that_is_left() {
         let mut lines = ProgressLines::new(LineFormat::Text, 110, 10);
         let after = |lines: &ProgressLines, seconds| lines.started + Duration::from_secs(seconds);
-        let report = StepReport { solves: 3, ..StepReport::default() };
+        let mut report = StepReport::default();
+        report.solves = 3;
         let at = after(&lines, 5);
         assert_eq!(lines.step(15, &report, at), None);
         let at = after(&lines, 20);

@@ -57,6 +57,7 @@ struct Version {
 /// A folder that does not hold a finished run.
 #[derive(Debug, thiserror::Error)]
 #[expect(missing_docs, reason = "the messages name the fields")]
+#[non_exhaustive]
 pub enum RecordError {
     /// The file cannot be read.
     #[error("cannot read {}; is this the folder of a finished run?", .path.display())]

@@ -18,6 +18,7 @@ use crate::simulation::Summary;
 /// A folder for which no page can be made.
 #[derive(Debug, thiserror::Error)]
 #[expect(missing_docs, reason = "the messages name the fields")]
+#[non_exhaustive]
 pub enum ReportError {
     /// The record of the run cannot be read.
     #[error(transparent)]

@@ -40,7 +40,7 @@ pub(super) fn add_contact(
     let push = contact.first_push(x, scene.dt).filter(is_fast);
     push.into_iter().for_each(|push| note(model, note_on_push(&push)));
     let contact = contact.with_friction(vertices.iter().map(|&vertex| model.friction[vertex]).collect());
-    let contact = contact.with_grips(island.prescribed().grips(&model.obstacles, vertices.len()));
+    let contact = contact.with_obstacle_friction(island.prescribed().friction(&model.obstacles, vertices.len()));
     island.body_mut().system.set_contact(Box::new(contact));
     Ok(())
 }
@@ -151,18 +151,29 @@ mod tests {
     use std::sync::atomic::{AtomicUsize, Ordering};
     use std::sync::{Arc, Mutex};
 
-    use energy_dsl::{Block, Vector3};
-    use energy_solve::{Contact, ContactCounts, ContactModel, DofMap};
+    use energy_dsl::Vector3;
+    use energy_solve::{Contact, ContactCounts, ContactForces, ContactModel, ContactStep, DofMap, Resistance};
 
     use super::*;
     use crate::Simulation;
     use crate::collision::crossings;
     use crate::scene::Scene;
 
-    /// Contact that judges every state and move by the exact test.
+    /// Contact whose states and moves are checked by the exact test.
     #[derive(Debug)]
     struct Watched {
         inner: Box<dyn ContactModel>,
+        record: Record,
+    }
+
+    /// The contact of a step, checked by the exact test.
+    struct WatchedStep<'a> {
+        inner: Box<dyn ContactStep + 'a>,
+        record: &'a mut Record,
+    }
+
+    #[derive(Debug)]
+    struct Record {
         mesh: CollisionMesh,
         iterates: Arc<AtomicUsize>,
         /// Start and end of each accepted move, as text.
@@ -170,7 +181,7 @@ mod tests {
         last: Vec<Vector3<f64>>,
     }
 
-    impl Watched {
+    impl Record {
         fn check(&self, x: &[Vector3<f64>]) {
             let found = crossings(&self.mesh, x);
             assert!(found.is_empty(), "{found:?}");
@@ -187,49 +198,68 @@ mod tests {
             }
             self.last = x.to_vec();
         }
-    }
 
-    impl ContactModel for Watched {
-        fn begin_step(&mut self, x: &[Vector3<f64>]) {
-            self.accept(x);
-            self.inner.begin_step(x);
-        }
-
-        fn certify(&mut self, from: &[Vector3<f64>], to: &[Vector3<f64>]) -> f64 {
-            let part = self.inner.certify(from, to);
-            for sample in 0..=4 {
-                let time = 0.25 * part * f64::from(sample);
-                let at = |(from, to): (&Vector3<f64>, &Vector3<f64>)| -> Vector3<f64> {
-                    std::array::from_fn(|axis| from[axis] + time * (to[axis] - from[axis]))
-                };
-                self.check(&from.iter().zip(to).map(at).collect::<Vec<_>>());
-            }
-            part
-        }
-
-        fn set_resistance(&mut self, dofs: &DofMap, diagonal: Vec<Block<f64>>, inertia: Vec<f64>) {
-            self.inner.set_resistance(dofs, diagonal, inertia);
-        }
-
-        fn meet(&mut self, x: &[Vector3<f64>]) -> f64 {
+        /// Returns the energy of a contact at x.
+        fn energy(&self, contact: &(impl ContactForces + ?Sized), x: &[Vector3<f64>]) -> f64 {
             self.check(x);
-            self.accept(x);
-            self.inner.meet(x)
-        }
-
-        fn energy(&self, x: &[Vector3<f64>]) -> f64 {
-            self.check(x);
-            let energy = self.inner.energy(x);
+            let energy = contact.energy(x);
             assert!(energy.is_finite(), "evaluated at a certified state");
             energy
+        }
+    }
+
+    impl ContactForces for Watched {
+        fn energy(&self, x: &[Vector3<f64>]) -> f64 {
+            self.record.energy(&*self.inner, x)
         }
 
         fn add_force(&self, x: &[Vector3<f64>], force: &mut [Vector3<f64>]) {
             self.inner.add_force(x, force);
         }
+    }
 
-        fn contacts(&mut self, dofs: &DofMap, x: &[Vector3<f64>]) -> Vec<Vec<Contact>> {
-            self.inner.contacts(dofs, x)
+    impl ContactModel for Watched {
+        fn begin_step(&mut self, x: &[Vector3<f64>]) -> Box<dyn ContactStep + '_> {
+            self.record.accept(x);
+            Box::new(WatchedStep { inner: self.inner.begin_step(x), record: &mut self.record })
+        }
+    }
+
+    impl ContactForces for WatchedStep<'_> {
+        fn energy(&self, x: &[Vector3<f64>]) -> f64 {
+            self.record.energy(&*self.inner, x)
+        }
+
+        fn add_force(&self, x: &[Vector3<f64>], force: &mut [Vector3<f64>]) {
+            self.inner.add_force(x, force);
+        }
+    }
+
+    impl ContactStep for WatchedStep<'_> {
+        fn filter_step(&mut self, from: &[Vector3<f64>], to: &[Vector3<f64>]) -> f64 {
+            let part = self.inner.filter_step(from, to);
+            for sample in 0..=4 {
+                let time = 0.25 * part * f64::from(sample);
+                let at = |(from, to): (&Vector3<f64>, &Vector3<f64>)| -> Vector3<f64> {
+                    std::array::from_fn(|axis| from[axis] + time * (to[axis] - from[axis]))
+                };
+                self.record.check(&from.iter().zip(to).map(at).collect::<Vec<_>>());
+            }
+            part
+        }
+
+        fn lag_friction(&mut self, resistance: &Resistance) {
+            self.inner.lag_friction(resistance);
+        }
+
+        fn update_active_set(&mut self, x: &[Vector3<f64>], resistance: &Resistance) -> f64 {
+            self.record.check(x);
+            self.record.accept(x);
+            self.inner.update_active_set(x, resistance)
+        }
+
+        fn stiffness(&mut self, dofs: &DofMap, x: &[Vector3<f64>]) -> Vec<Vec<Contact>> {
+            self.inner.stiffness(dofs, x)
         }
 
         fn restrict(&mut self, moving: &[bool]) {
@@ -284,8 +314,8 @@ mod tests {
         let system = &mut island.body_mut().system;
         let inner = system.take_contact().unwrap();
         let (own, counted, written) = (mesh.clone(), Arc::clone(&iterates), Arc::clone(&moves));
-        let watched = Watched { inner, mesh: own, iterates: counted, moves: written, last: Vec::new() };
-        system.set_contact(Box::new(watched));
+        let record = Record { mesh: own, iterates: counted, moves: written, last: Vec::new() };
+        system.set_contact(Box::new(Watched { inner, record }));
         for _ in 0..steps {
             simulation.step().unwrap_or_else(|error| panic!("{error}"));
         }

@@ -126,7 +126,7 @@ impl Island {
         before.iter().for_each(|(vertex, _)| self.body.v[*vertex] = [0.0; 3]);
         if !targets.is_empty() {
             let own = self.vertices.iter().enumerate();
-            let pinned = own.filter(|(place, _)| self.body.system.dofs().place(*place).is_none());
+            let pinned = own.filter(|(place, _)| self.body.system.dofs().row(*place).is_none());
             self.targets = pinned.filter_map(|(place, vertex)| Some((place, *targets.get(vertex)?))).collect();
         }
         if had || !self.targets.is_empty() {
@@ -303,10 +303,8 @@ impl Island {
         self.sleep = saved.sleep;
         self.contact_energy = saved.contact_energy;
         self.body.system.restore_histories(&saved.histories);
-        if let Some((contact, _)) = self.body.system.contact() {
-            let (names, vectors) = saved.bristles;
-            contact.restore(ContactMemory { names, vectors });
-        }
+        let (names, vectors) = saved.bristles;
+        self.body.system.restore_contact(ContactMemory { names, vectors });
     }
 
     /// Keeps the last step, now that it has succeeded everywhere.

@@ -47,6 +47,7 @@ use sleep::StepContext;
 
 /// A scene that cannot be set up, or a step that failed.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum SimulationError {
     /// The parts of the scene do not fit together.
     #[error(transparent)]

@@ -58,6 +58,7 @@ pub struct Controls {
 /// A control that does not fit the scene or the state.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[expect(missing_docs, reason = "the messages name the fields")]
+#[non_exhaustive]
 pub enum ControlError {
     /// There is no such obstacle.
     #[error(

@@ -2,7 +2,7 @@
 
 use energy_dsl::Vector3;
 
-use crate::barrier::Grip;
+use crate::barrier::ObstacleFriction;
 use crate::collision::Core;
 use crate::contact::{AnySolid, Deformation, HalfSpace, Obstacle};
 use crate::geometry::{Pose, add_scaled, dot, subtract};
@@ -48,14 +48,14 @@ impl Prescribed {
     }
 
     /// Returns the friction of each obstacle, given the number of vertices before those of the obstacles.
-    pub fn grips(&self, obstacles: &[Obstacle], first: usize) -> Vec<Grip> {
+    pub fn friction(&self, obstacles: &[Obstacle], first: usize) -> Vec<ObstacleFriction> {
         let mut next = first + self.obstacles.iter().map(|part| part.core.vertices.len()).sum::<usize>();
-        let mut grip = |(part, obstacle): (&Part, &Obstacle)| {
+        let mut friction = |(part, obstacle): (&Part, &Obstacle)| {
             let frame = (!part.frame().is_empty()).then(|| energy_solve::index(next));
             next += part.frame().len();
-            Grip { coefficient: obstacle.friction, frame, deforms: part.deformation.is_some() }
+            ObstacleFriction { coefficient: obstacle.friction, frame, deforms: part.deformation.is_some() }
         };
-        self.obstacles.iter().zip(obstacles).map(&mut grip).collect()
+        self.obstacles.iter().zip(obstacles).map(&mut friction).collect()
     }
 
     /// Returns the positions at each of some times, in s, for cloth about a point at the first of them.
@@ -136,7 +136,7 @@ mod tests {
         let ball = |motion| obstacle(AnySolid::Ball(Ball { centre: [1.0, 0.0, 0.0], radius: 0.1 }), motion);
         let obstacles = [ball(Some(motion)), ball(None)];
         let prescribed = Prescribed::new(&obstacles);
-        let frames = prescribed.grips(&obstacles, 10).iter().map(|grip| grip.frame).collect::<Vec<_>>();
+        let frames = prescribed.friction(&obstacles, 10).iter().map(|friction| friction.frame).collect::<Vec<_>>();
         assert_eq!(frames, [Some(12), None]);
         let [start, end] = prescribed.positions([0.0, 1.0], [0.0; 3]);
         assert_eq!(start.len(), 6);

@@ -44,8 +44,9 @@ impl From<SavedCounts> for Counts {
     fn from(SavedCounts(rows): SavedCounts) -> Self {
         let tally =
             |[evaluated, skipped, flagged, projected]: [u64; 4]| Tally { evaluated, skipped, flagged, projected };
-        let [value, gradient, hessian] = rows.map(tally);
-        Self { value, gradient, hessian, reused: 0 }
+        let mut counts = Self::default();
+        [counts.value, counts.gradient, counts.hessian] = rows.map(tally);
+        counts
     }
 }
 
@@ -70,6 +71,7 @@ pub(super) mod saved_counts {
 
 /// A saved state that cannot be restored into a simulation.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum RestoreError {
     /// The state has other vertices, masses, islands or terms than the scene.
     #[error(
@@ -137,8 +139,8 @@ impl Simulation {
         (self.x, self.v) = (saved.x, saved.v);
         self.ledger = saved.ledger;
         self.summary.totals = saved.totals;
-        let counts = saved.counts.into_iter().zip(saved.reused);
-        self.earlier = counts.map(|(counts, reused)| Counts { reused, ..counts.into() }).collect();
+        self.earlier = saved.counts.into_iter().map(Counts::from).collect();
+        self.earlier.iter_mut().zip(saved.reused).for_each(|(counts, reused)| counts.reused = reused);
         // Begin the last step again: obstacles stay where it moved them.
         let (time, dt) = (self.time() - self.dt, self.dt);
         for (island, saved) in self.islands.iter_mut().zip(saved.islands) {

@@ -14,6 +14,7 @@ use crate::scene::{ContactChoice, Scene};
 
 /// The outcome of a simulation. `Display` prints it as a report.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct Summary {
     /// Number of vertices.
     pub vertices: usize,
@@ -64,6 +65,7 @@ pub struct Summary {
 
 /// The work done by one term, and its energy at the end.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct TermSummary {
     /// The term's name.
     pub name: String,
@@ -104,7 +106,7 @@ impl Summary {
     /// The phases of a step, in order, with the total time of each.
     #[must_use]
     pub fn named_phases(&self) -> [(&'static str, Duration); 5] {
-        let Phases { assembly, factorisation, solve, line_search, collision } = self.totals.phases;
+        let Phases { assembly, factorisation, solve, line_search, collision, .. } = self.totals.phases;
         [
             ("assembly", assembly),
             ("factorisation", factorisation),
@@ -256,7 +258,7 @@ const PINNED: &str = "Contact moves free vertices only, and all vertices there a
 fn pin_force(body: &Body, force: &[Vector3<f64>]) -> Vector3<f64> {
     let mut total = [0.0; 3];
     for (vertex, force) in force.iter().enumerate() {
-        if body.system.dofs().place(vertex).is_none() {
+        if body.system.dofs().row(vertex).is_none() {
             (0..3).for_each(|axis| total[axis] += force[axis]);
         }
     }

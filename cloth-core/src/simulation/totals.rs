@@ -7,6 +7,7 @@ use crate::integrator::{ContactWork, Phases, SolvedBy, StepReport};
 
 /// Running totals over all steps. Summaries and checkpoints hold these as keys of their own.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct Totals {
     /// Completed steps.
     pub steps: u64,

@@ -92,7 +92,7 @@ impl Equilibrium {
     fn linearise(&mut self, curvature: Curvature) -> Result<Vec<Vector3<f64>>, ValidateError> {
         let still = vec![[0.0; 3]; self.x.len()];
         let weights = Weights { position: -1.0, velocity: 0.0 };
-        let options = LinearisationOptions { weights, curvature, stiffness_times_velocity: false };
+        let options = LinearisationOptions::new(weights, curvature);
         let linear = self.system.linearise(State { x: &self.x, v: &still }, options, &mut self.matrix)?;
         Ok(self.system.dofs().gather(&linear.force))
     }

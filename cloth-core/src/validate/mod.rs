@@ -79,6 +79,7 @@ impl Finding {
 /// A case that cannot be set up or solved.
 #[derive(Debug, thiserror::Error)]
 #[expect(missing_docs, reason = "the messages name the fields")]
+#[non_exhaustive]
 pub enum ValidateError {
     /// The mesh is invalid.
     #[error(transparent)]

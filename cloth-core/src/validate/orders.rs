@@ -99,7 +99,7 @@ fn schemes() -> Vec<(Box<dyn Integrator>, f64, f64)> {
         linear_tolerance: 1e-9,
         ..NewtonOptions::default()
     };
-    let linear = SolveOptions { relative_tolerance: 1e-12, iteration_limit: 1000 };
+    let linear = SolveOptions::new(1e-12).with_iteration_limit(1000);
     vec![
         (Box::new(ExplicitEuler::default()), 1.0, 0.05),
         (Box::new(SymplecticEuler), 1.0, 0.05),

@@ -117,7 +117,7 @@ impl TermDescription for GripTerm {
 impl Term for GripTerm {
     fn place(mut self: Box<Self>, dofs: &DofMap, pattern: &Pattern) -> Box<dyn PlacedTerm> {
         self.slots =
-            self.stencils.iter().map(|&vertex| dofs.place(vertex as usize).map(|row| pattern.diagonal(row))).collect();
+            self.stencils.iter().map(|&vertex| dofs.row(vertex as usize).map(|row| pattern.diagonal(row))).collect();
         self
     }
 }

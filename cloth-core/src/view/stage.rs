@@ -15,6 +15,7 @@ use crate::simulation::{Extension, Simulation, SimulationError};
 /// A scene or run that cannot be viewed.
 #[derive(Debug, thiserror::Error)]
 #[expect(missing_docs, reason = "the messages name the fields")]
+#[non_exhaustive]
 pub enum ViewError {
     /// The scene file is invalid.
     #[error(transparent)]

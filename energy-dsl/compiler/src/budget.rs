@@ -15,6 +15,7 @@ use crate::diagnostic::{Diagnostic, Span};
 
 /// The largest amounts that a text may spend.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Limits {
     /// Steps of the compiler. One step checks, creates, copies or writes one operation.
     pub steps: u64,
@@ -25,6 +26,12 @@ pub struct Limits {
 impl Limits {
     /// No limits, for texts that are trusted.
     pub const NONE: Self = Self { steps: u64::MAX, bytes: u64::MAX };
+
+    /// Creates limits of steps and bytes.
+    #[must_use]
+    pub const fn new(steps: u64, bytes: u64) -> Self {
+        Self { steps, bytes }
+    }
 
     /// Returns the attribute that sets these limits.
     pub(crate) fn attribute(self) -> String {
@@ -69,6 +76,7 @@ impl Phase {
 
 /// The state of a compilation.
 #[derive(Clone, Copy, Debug)]
+#[non_exhaustive]
 pub struct Progress {
     /// The part of the compiler that runs.
     pub phase: Phase,
@@ -133,7 +141,7 @@ type Watch = Arc<dyn Fn(&Progress) -> ControlFlow<()> + Send + Sync>;
 /// use energy_compiler::{Budget, Interpreted, Limits};
 /// let source = "energy Pull(p, q: Point; k: Scalar) { k / 2 * norm_squared(p - q) }";
 /// assert!(Interpreted::from_source_within(source, &Budget::default()).is_ok());
-/// let tight = Budget::new(Limits { steps: 1000, ..Limits::default() });
+/// let tight = Budget::new(Limits::new(1000, Limits::default().bytes));
 /// let refused = Interpreted::from_source_within(source, &tight).unwrap_err();
 /// assert!(refused.to_string().contains("more than 1,000 steps"));
 /// ```

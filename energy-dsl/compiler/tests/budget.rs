@@ -184,7 +184,7 @@ fn the_error_names_statement_amount_and_limit() {
     assert!(message.contains("while `A` was differentiated"), "{message}");
     assert!(message.contains("#[limits(bytes = 2e9)]"), "{message}");
 
-    let tight = Budget::new(Limits { steps: 40_000, ..Limits::default() });
+    let tight = Budget::new(Limits::new(40_000, Limits::default().bytes));
     let text = "energy A(p, q: Point; k: Scalar) {
         let a = norm(p - q) + 1;
         let b = sum(i in 0..500, sin(i * k * norm(p)) * cos(i * norm(q))) * a;
@@ -297,7 +297,7 @@ impl Random {
 /// Work that is not counted would show as time beyond the budget.
 #[test]
 fn random_texts_keep_to_a_small_budget() {
-    let limits = Limits { steps: 200_000, bytes: 30_000_000 };
+    let limits = Limits::new(200_000, 30_000_000);
     let (mut compiled, mut refused, mut wrong) = (0, 0, 0);
     for seed in 1..=60_u64 {
         let text = Random(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15)).text();

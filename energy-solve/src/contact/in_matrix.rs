@@ -19,14 +19,14 @@ pub struct ContactsInMatrix<T> {
     pub others: Vec<Contact>,
 }
 
-/// A block and its place in a matrix.
+/// A block and its slot in a matrix.
 type Stored<T> = (u32, [[T; 3]; 3]);
 
-/// The pairs of corners of a stencil that a matrix stores, with the places of their blocks.
+/// The pairs of corners of a stencil that a matrix stores, with the slots of their blocks.
 #[derive(Default)]
-struct Places(Vec<(usize, usize, usize)>);
+struct Slots(Vec<(usize, usize, usize)>);
 
-impl Places {
+impl Slots {
     /// Looks up the blocks of four rows. Returns whether the pattern has all of them.
     fn find(&mut self, rows: [u32; 4], pattern: &Pattern) -> bool {
         self.0.clear();
@@ -35,30 +35,30 @@ impl Places {
         let is_stored = |row: u32, column: u32| pattern.storage() == Storage::Whole || row <= column;
         let pairs = free().flat_map(|one| free().map(move |other| (one, other)));
         pairs.filter(|((_, row), (_, column))| is_stored(*row, *column)).all(|((i, row), (j, column))| {
-            let place = pattern.place(row as usize, column as usize);
-            self.0.extend(place.map(|(place, _)| (i, j, place)));
-            place.is_some()
+            let found = pattern.slot(row as usize, column as usize);
+            self.0.extend(found.map(|(slot, _)| (i, j, slot)));
+            found.is_some()
         })
     }
 }
 
 /// Returns the blocks of the contacts that fit into a pattern, and the other contacts, all times a scale. Contacts of
 /// the same vertices that follow each other are summed.
-fn placed<T: Precision>(contacts: &[Contact], scale: f64, pattern: &Pattern) -> (Vec<Stored<T>>, Vec<Contact>) {
+fn in_pattern<T: Precision>(contacts: &[Contact], scale: f64, pattern: &Pattern) -> (Vec<Stored<T>>, Vec<Contact>) {
     let (mut stored, mut others) = (Vec::with_capacity(2 * contacts.len()), Vec::new());
-    let mut places = Places::default();
+    let mut slots = Slots::default();
     for same in contacts.chunk_by(|one, other| one.rows == other.rows) {
-        if !places.find(same[0].rows, pattern) {
+        if !slots.find(same[0].rows, pattern) {
             let scaled = |block: Block<f64>| block.map(|row| row.map(|entry| scale * entry));
             others.extend(same.iter().map(|contact| Contact { block: scaled(contact.block), ..*contact }));
             continue;
         }
-        for &(i, j, place) in &places.0 {
+        for &(i, j, slot) in &slots.0 {
             let mut sum = [[0.0; 3]; 3];
             for Contact { weights, block, .. } in same {
                 add_scaled_block(&mut sum, scale * weights[i] * weights[j], block);
             }
-            stored.push((index(place), sum.map(|row| row.map(T::from_f64))));
+            stored.push((index(slot), sum.map(|row| row.map(T::from_f64))));
         }
     }
     (stored, others)
@@ -71,11 +71,11 @@ impl<T: Precision> BlockMatrix<T> {
     pub fn add_contacts(&mut self, contacts: &[Vec<Contact>], scale: f64, threads: usize) -> ContactsInMatrix<T> {
         let contents = self.take_contents();
         let pattern = &**self.pattern();
-        let parts = for_each(threads, contacts.iter().collect(), |part| placed(part, scale, pattern));
+        let parts = for_each(threads, contacts.iter().collect(), |part| in_pattern(part, scale, pattern));
         let (mut replaced, others): (Vec<Vec<Stored<T>>>, Vec<_>) = parts.into_iter().unzip();
         let values = self.values_and_nowhere();
-        for (place, block) in replaced.iter_mut().flatten() {
-            let value = &mut values[*place as usize];
+        for (slot, block) in replaced.iter_mut().flatten() {
+            let value = &mut values[*slot as usize];
             let added = std::mem::replace(block, *value);
             for row in 0..3 {
                 for column in 0..3 {
@@ -90,8 +90,8 @@ impl<T: Precision> BlockMatrix<T> {
     pub fn remove_contacts(&mut self, contacts: ContactsInMatrix<T>) {
         let values = self.values_and_nowhere();
         // Several contacts may share a block.
-        for (place, block) in contacts.replaced.into_iter().rev().flat_map(|part| part.into_iter().rev()) {
-            values[place as usize] = block;
+        for (slot, block) in contacts.replaced.into_iter().rev().flat_map(|part| part.into_iter().rev()) {
+            values[slot as usize] = block;
         }
         self.set_contents(contacts.contents);
     }

@@ -1,8 +1,8 @@
-//! Contact: forces between features that meet for a while, and then part.
+//! Contact: forces between features while they are close.
 //!
 //! A [`Term`](crate::Term) has fixed stencils and a fixed matrix pattern. Pairs in contact change from iteration to
-//! iteration, so contact is not a term. A [`ContactModel`] lists the stiffness of the pairs in contact as [`Contact`]s
-//! instead, which solvers apply without a place in the matrix.
+//! iteration, so contact is not a term. A [`ContactStep`] lists the stiffness of the pairs in contact as [`Contact`]s
+//! instead, which solvers apply without a slot in the matrix.
 
 mod block;
 mod in_matrix;
@@ -12,5 +12,5 @@ mod pressed;
 pub use block::Contact;
 pub(crate) use block::factors;
 pub use in_matrix::ContactsInMatrix;
-pub use model::{ContactCounts, ContactMemory, ContactModel, Touching};
+pub use model::{ContactCounts, ContactForces, ContactMemory, ContactModel, ContactStep, Resistance, Touching};
 pub use pressed::{Pressed, Presser};

@@ -3,67 +3,32 @@ use energy_dsl::{Block, Vector3};
 use super::{Contact, Pressed};
 use crate::matrix::dof_map::DofMap;
 
-/// Contact between features of a body, as an integrator that minimises an incremental potential uses it.
-///
-/// The state before the first step has no crossing. The integrator then asks for a certificate of every move of
-/// positions, and evaluates energies only where a certificate allows it to go. By induction no state that it accepts
-/// has a crossing.
-///
-/// 1. [`ContactModel::begin_step`] forgets the pairs of the last step.
-/// 2. [`ContactModel::certify`] shortens each move: the warm start, the motion of pins, each trial of a line search.
-/// 3. [`ContactModel::set_resistance`] tells how stiff the body is at the first iterate.
-/// 4. [`ContactModel::meet`] is called at each new iterate. Pairs join there and then stay until the step ends, so that
-///    a line search sees a single function.
-/// 5. [`ContactModel::energy`], [`ContactModel::add_force`] and [`ContactModel::contacts`] evaluate the pairs.
-/// 6. Between [`ContactModel::restrict`] and [`ContactModel::release`], only some vertices move. Pairs of others
-///    may then be left out.
-pub trait ContactModel: std::fmt::Debug + Send {
-    /// Sets the largest number of threads. Results must not depend on it.
-    fn set_threads(&mut self, _threads: usize) {}
-
-    /// Begins a step at x: forgets all pairs.
-    fn begin_step(&mut self, x: &[Vector3<f64>]);
-
-    /// Returns the part of the straight move between two states that certainly has no crossing: 1 for the whole move.
-    /// Pairs that shorten the move join at the next [`ContactModel::meet`].
-    fn certify(&mut self, from: &[Vector3<f64>], to: &[Vector3<f64>]) -> f64;
-
-    /// Sets the resistance of vertices to displacement: the diagonal blocks of M/h² + ∂²U/∂x² by row, and m/h² by
-    /// vertex, in N/m.
-    fn set_resistance(&mut self, dofs: &DofMap, diagonal: Vec<Block<f64>>, inertia: Vec<f64>);
-
-    /// Adds the pairs that meet at an iterate. Returns the change of the energy there, in J.
-    fn meet(&mut self, x: &[Vector3<f64>]) -> f64;
-
+/// The forces of the active set: the pairs in contact.
+pub trait ContactForces {
     /// Returns Σ U, in J; infinite if a pair is within its thickness. With friction, U includes its potential.
     fn energy(&self, x: &[Vector3<f64>]) -> f64;
 
     /// Adds −∇U to the forces on all vertices, in N.
     fn add_force(&self, x: &[Vector3<f64>], force: &mut [Vector3<f64>]);
+}
 
-    /// Returns the stiffness of each pair in contact, and of friction, in N/m. They come in lists that several threads
-    /// may take, in an order that does not depend on threads. Those of the same vertices should follow each other.
-    fn contacts(&mut self, dofs: &DofMap, x: &[Vector3<f64>]) -> Vec<Vec<Contact>>;
+/// Contact between features of a body, between steps. Its forces are those of the last step.
+///
+/// The state before the first step has no crossing. In a step, an integrator that minimises an incremental potential
+/// passes every move of positions through [`ContactStep::filter_step`], and evaluates energies only where this allows
+/// it to go. By induction no state that it accepts has a crossing.
+pub trait ContactModel: ContactForces + std::fmt::Debug + Send {
+    /// Sets the largest number of threads. Results must not depend on it.
+    fn set_threads(&mut self, _threads: usize) {}
 
-    /// From now on until [`ContactModel::release`], only these vertices move, from an iterate where the last
-    /// [`ContactModel::meet`] was. Pairs of other vertices may be left out of all sums.
-    fn restrict(&mut self, moving: &[bool]);
-
-    /// Lets all vertices move again, from an iterate where the last [`ContactModel::meet`] was.
-    fn release(&mut self);
-
-    /// Returns where contact presses the most at x, for messages. Default nowhere.
-    fn most_pressed(&self, _x: &[Vector3<f64>]) -> Option<Pressed> {
-        None
-    }
+    /// Begins a step at x, where the last step ended, with an empty active set. The step ends when its contact is
+    /// dropped. A step that failed may begin again.
+    fn begin_step(&mut self, x: &[Vector3<f64>]) -> Box<dyn ContactStep + '_>;
 
     /// Returns the pairs in contact at x, where the last step ended, for a caller. Default none.
     fn touching(&self, _x: &[Vector3<f64>]) -> Vec<Touching> {
         Vec::new()
     }
-
-    /// Returns what was counted so far.
-    fn counts(&self) -> ContactCounts;
 
     /// Returns what later steps depend on, for a checkpoint at x, where the last step ended. Default nothing.
     fn memory(&self, _x: &[Vector3<f64>]) -> ContactMemory {
@@ -72,6 +37,61 @@ pub trait ContactModel: std::fmt::Debug + Send {
 
     /// Restores the memory of a checkpoint.
     fn restore(&mut self, _memory: ContactMemory) {}
+}
+
+/// Contact during one step.
+pub trait ContactStep: ContactForces {
+    /// Returns the part of the straight move between two states that is certified to have no crossing: 1 for the whole
+    /// move. Pairs that shorten the move become active at the next [`ContactStep::update_active_set`].
+    fn filter_step(&mut self, from: &[Vector3<f64>], to: &[Vector3<f64>]) -> f64;
+
+    /// Lags friction: it acts on the pairs in contact at the start of the step, with their normal forces there.
+    fn lag_friction(&mut self, resistance: &Resistance);
+
+    /// Adds pairs to the active set at a new iterate. They stay until the step ends, so that a line search sees a
+    /// single function. The resistance is that at the first iterate. Returns the change of the energy at x, in J.
+    fn update_active_set(&mut self, x: &[Vector3<f64>], resistance: &Resistance) -> f64;
+
+    /// Returns the stiffness of each active pair, and of friction, in N/m. They come in lists that several threads may
+    /// take, in an order that does not depend on threads. Those of the same vertices should follow each other.
+    fn stiffness(&mut self, dofs: &DofMap, x: &[Vector3<f64>]) -> Vec<Vec<Contact>>;
+
+    /// Lets only these vertices move until [`ContactStep::release`], from the iterate of the last
+    /// [`ContactStep::update_active_set`]. Pairs of other vertices may be left out of all sums.
+    fn restrict(&mut self, moving: &[bool]);
+
+    /// Lets all vertices move again, from the iterate of the last [`ContactStep::update_active_set`].
+    fn release(&mut self);
+
+    /// Returns where contact presses the most at x, for messages. Default nowhere.
+    fn most_pressed(&self, _x: &[Vector3<f64>]) -> Option<Pressed> {
+        None
+    }
+
+    /// Returns what was counted in all steps so far.
+    fn counts(&self) -> ContactCounts;
+}
+
+/// The resistance of vertices to displacement, in N/m, from which contact derives the stiffness of its pairs.
+#[derive(Clone, Debug)]
+#[non_exhaustive]
+pub struct Resistance {
+    /// Diagonal blocks of M/h² + ∂²U/∂x² by vertex; `None` for a pinned one.
+    pub blocks: Vec<Option<Block<f64>>>,
+    /// m/h² by vertex, the least resistance.
+    pub inertia: Vec<f64>,
+}
+
+impl Resistance {
+    /// Takes the diagonal blocks by row, and m/h² by vertex.
+    #[must_use]
+    pub fn new(dofs: &DofMap, diagonal: impl IntoIterator<Item = Block<f64>>, inertia: Vec<f64>) -> Self {
+        let mut blocks = vec![None; dofs.vertex_count()];
+        for (&vertex, block) in dofs.free().iter().zip(diagonal) {
+            blocks[vertex] = Some(block);
+        }
+        Self { blocks, inertia }
+    }
 }
 
 /// Two features in contact.
@@ -100,6 +120,7 @@ pub struct ContactMemory {
 
 /// Numbers of pairs and moves.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[non_exhaustive]
 pub struct ContactCounts {
     /// Searches for candidate pairs.
     pub searches: u64,

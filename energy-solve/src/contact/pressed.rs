@@ -1,6 +1,6 @@
 use std::fmt;
 
-/// The place where contact presses a body the most. Messages about failed steps name it.
+/// The feature of a body that contact presses the most. Messages about failed steps name it.
 ///
 /// ```
 /// use energy_solve::{Pressed, Presser};

@@ -7,6 +7,7 @@ use crate::matrix::pattern::Pattern;
 
 /// Options of [`GaussNewton`].
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct GaussNewtonOptions {
     /// The damping μ in (JᵀJ + μ 1) d = −Jᵀr, in the unit of JᵀJ.
     pub damping: f64,
@@ -36,6 +37,7 @@ impl Default for GaussNewtonOptions {
 
 /// The energy of one term.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct TermCost {
     /// Name of the term.
     pub name: String,
@@ -60,6 +62,7 @@ pub enum Outcome {
 
 /// Statistics of one iteration.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct IterationReport {
     /// Energies of the terms before the step.
     pub terms: Vec<TermCost>,
@@ -83,6 +86,7 @@ pub struct IterationReport {
 
 /// A problem that cannot be solved.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum GaussNewtonError {
     /// An unknown is infinite or NaN.
     #[error("unknown {unknown} of block {block} is not finite")]

@@ -13,6 +13,7 @@ pub(crate) type WideBlock<const D: usize> = [[f64; WIDTH]; D];
 
 /// Stencils that do not fit a pattern.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum CouplingError {
     /// A stencil names a block of unknowns that does not exist.
     #[error("element {element} acts on block {block} of unknowns, but there are only {blocks}")]
@@ -95,7 +96,7 @@ impl Couplings {
                         return Err(CouplingError::Repeated { element, block: a });
                     }
                     let (slot, _) =
-                        pattern.place(a, b).ok_or(CouplingError::NotInPattern { element, first: a, second: b })?;
+                        pattern.slot(a, b).ok_or(CouplingError::NotInPattern { element, first: a, second: b })?;
                     slots.push(2 * slot as u32 + u32::from(first > second));
                 }
             }
@@ -175,9 +176,9 @@ impl<const D: usize> NormalMatrix<D> {
     /// Returns block (row, column); zero if it is not in the pattern.
     #[must_use]
     pub fn block(&self, row: usize, column: usize) -> [[f64; D]; D] {
-        let place = self.pattern.place(row, column);
+        let slot = self.pattern.slot(row, column);
         let entry = |i: usize, j: usize| {
-            place.map_or(0.0, |(at, turned)| if turned { self.values[at][j][i] } else { self.values[at][i][j] })
+            slot.map_or(0.0, |(at, turned)| if turned { self.values[at][j][i] } else { self.values[at][i][j] })
         };
         std::array::from_fn(|i| std::array::from_fn(|j| entry(i, j)))
     }
@@ -262,9 +263,9 @@ mod tests {
             (0..4).map(|row| pattern.row(row).map(|(_, column)| column).collect()).collect::<Vec<Vec<_>>>(),
             [vec![0, 1, 3], vec![1], vec![2], vec![3]]
         );
-        assert_eq!(pattern.place(0, 3), Some((2, false)));
-        assert_eq!(pattern.place(3, 0), Some((2, true)));
-        assert_eq!(pattern.place(1, 3), None);
+        assert_eq!(pattern.slot(0, 3), Some((2, false)));
+        assert_eq!(pattern.slot(3, 0), Some((2, true)));
+        assert_eq!(pattern.slot(1, 3), None);
     }
 
     #[test]

@@ -21,6 +21,7 @@ pub enum NormalSolverKind {
 
 /// Normal equations that cannot be solved.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum SolverError {
     /// A pivot is not positive.
     #[error("the damped JᵀJ is not positive definite; increase the damping")]
@@ -57,9 +58,9 @@ impl NormalSolver {
                 Ok(factor) => Ok(Self::Cholesky(factor.into())),
                 Err(OutOfMemory) => Err(SolverError::OutOfMemory { unknowns: size * pattern.rows() }),
             },
-            NormalSolverKind::ConjugateGradients { relative_tolerance, iteration_limit } => {
-                Ok(Self::ConjugateGradients(SolveOptions { relative_tolerance, iteration_limit }))
-            }
+            NormalSolverKind::ConjugateGradients { relative_tolerance, iteration_limit } => Ok(
+                Self::ConjugateGradients(SolveOptions::new(relative_tolerance).with_iteration_limit(iteration_limit)),
+            ),
         }
     }
 

@@ -123,32 +123,32 @@ impl<E: PackedResidual<f64> + Debug, const D: usize> ResidualTerm<E, D> {
         self.stencils.clear();
         self.weights.clear();
         let mut last = None;
-        for (place, Placed { element, stencil, weight }) in elements.into_iter().enumerate() {
+        for (number, Placed { element, stencil, weight }) in elements.into_iter().enumerate() {
             assert!(
                 (stencil as usize) < self.couplings.len(),
                 "stencil {stencil} is out of range: there are {}",
                 self.couplings.len()
             );
-            if place % BLOCK == 0 {
+            if number % BLOCK == 0 {
                 self.numbers.resize(self.numbers.len() + Self::BLOCK_NUMBERS, 0.0);
             }
-            self.write(place, &element);
+            self.write(number, &element);
             self.stencils.push(stencil);
             self.weights.push(weight);
             last = Some(element);
         }
         if let Some(element) = last {
             // Unused lanes repeat the last element.
-            let places = self.stencils.len();
-            (places..places.next_multiple_of(BLOCK)).for_each(|place| self.write(place, &element));
+            let count = self.stencils.len();
+            (count..count.next_multiple_of(BLOCK)).for_each(|number| self.write(number, &element));
         }
     }
 
     /// Numbers per pack of elements. Elements without numbers take one, so that each has a position.
     const BLOCK_NUMBERS: usize = BLOCK * if E::NUMBERS == 0 { 1 } else { E::NUMBERS };
 
-    fn write(&mut self, place: usize, element: &E) {
-        element.store(&mut self.numbers[place / BLOCK * Self::BLOCK_NUMBERS + place % BLOCK..], BLOCK);
+    fn write(&mut self, number: usize, element: &E) {
+        element.store(&mut self.numbers[number / BLOCK * Self::BLOCK_NUMBERS + number % BLOCK..], BLOCK);
     }
 
     /// Returns all residuals without weights, element by element.
@@ -469,7 +469,7 @@ fn add_products<L: Level, const D: usize>(
     let mut slots = slots.iter();
     for i in 0..arity {
         for j in i..arity {
-            let &slot = slots.next().expect("one place per pair");
+            let &slot = slots.next().expect("one slot per pair");
             let (a, b) = if slot & 1 == 0 { (i, j) } else { (j, i) };
             let block = &mut blocks[(slot >> 1) as usize];
             for row in 0..rows {

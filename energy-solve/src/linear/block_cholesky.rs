@@ -42,6 +42,7 @@ pub struct BlockCholesky {
 
 /// A factorisation that failed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum CholeskyError {
     /// A pivot is not positive.
     #[error("the matrix is not positive definite")]

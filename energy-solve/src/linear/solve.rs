@@ -1,6 +1,7 @@
 /// A diagonal block without an inverse.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("the diagonal block of row {row} is singular or not finite; a free vertex needs mass or stiffness")]
+#[non_exhaustive]
 pub struct SingularBlock {
     /// Block row of the diagonal block.
     pub row: usize,
@@ -8,6 +9,7 @@ pub struct SingularBlock {
 
 /// Stopping criteria of a linear solver.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct SolveOptions {
     /// Stop once the residual is this much smaller than the right-hand side. Conjugate gradients measure both as √(rᵀ
     /// D⁻¹ r), BiCGSTAB as ‖D⁻¹ r‖. The preconditioner D contains masses and stiffnesses, so the test means the same
@@ -15,6 +17,20 @@ pub struct SolveOptions {
     pub relative_tolerance: f64,
     /// Stop after this many iterations.
     pub iteration_limit: usize,
+}
+
+impl SolveOptions {
+    /// Creates options with this relative tolerance.
+    #[must_use]
+    pub fn new(relative_tolerance: f64) -> Self {
+        Self { relative_tolerance, ..Self::default() }
+    }
+
+    /// Sets the largest number of iterations.
+    #[must_use]
+    pub const fn with_iteration_limit(self, iteration_limit: usize) -> Self {
+        Self { iteration_limit, ..self }
+    }
 }
 
 impl Default for SolveOptions {
@@ -53,6 +69,7 @@ impl std::fmt::Display for StopReason {
 
 /// Statistics of one solve.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct SolveReport {
     /// Number of iterations.
     pub iterations: usize,

@@ -50,18 +50,18 @@ impl<T: Precision> BlockMatrix<T> {
     /// Returns block (row, column); zero if it is not in the pattern.
     #[must_use]
     pub fn block(&self, row: usize, column: usize) -> Block<f64> {
-        let Some((slot, flipped)) = self.pattern.place(row, column) else { return [[0.0; 3]; 3] };
+        let Some((slot, flipped)) = self.pattern.slot(row, column) else { return [[0.0; 3]; 3] };
         let block = doubled(&self.values[slot]);
         if flipped { transposed(&block) } else { block }
     }
 
-    /// Returns the stored blocks, by [`Pattern::place`].
+    /// Returns the stored blocks, by [`Pattern::slot`].
     #[must_use]
     pub fn values(&self) -> &[Block<T>] {
         &self.values[..self.pattern.blocks()]
     }
 
-    /// Returns the stored blocks for modification, by [`Pattern::place`].
+    /// Returns the stored blocks for modification, by [`Pattern::slot`].
     pub fn values_mut(&mut self) -> &mut [Block<T>] {
         self.contents = None;
         let stored = self.pattern.blocks();

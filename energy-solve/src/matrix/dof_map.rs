@@ -2,14 +2,14 @@ use energy_dsl::Vector3;
 
 use crate::matrix::pattern::index;
 
-/// Marks a pinned vertex in [`DofMap::place`].
+/// Marks a pinned vertex in [`DofMap::row`].
 const PINNED: u32 = u32::MAX;
 
 /// Maps vertices to the rows of a vector or matrix over the free vertices.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct DofMap {
     /// The row of each vertex; [`PINNED`] if it is pinned.
-    place: Vec<u32>,
+    rows: Vec<u32>,
     free: Vec<usize>,
 }
 
@@ -19,18 +19,18 @@ impl DofMap {
     pub fn new(pinned: &[bool]) -> Self {
         let mut free: Vec<usize> = (0..pinned.len()).filter(|&vertex| !pinned[vertex]).collect();
         free.shrink_to_fit();
-        let mut place = vec![PINNED; pinned.len()];
+        let mut rows = vec![PINNED; pinned.len()];
         for (number, &vertex) in free.iter().enumerate() {
-            place[vertex] = index(number);
+            rows[vertex] = index(number);
         }
-        Self { place, free }
+        Self { rows, free }
     }
 
     /// Returns the row of a vertex; `None` if it is pinned.
     #[must_use]
-    pub fn place(&self, vertex: usize) -> Option<usize> {
-        let place = self.place[vertex];
-        (place != PINNED).then_some(place as usize)
+    pub fn row(&self, vertex: usize) -> Option<usize> {
+        let row = self.rows[vertex];
+        (row != PINNED).then_some(row as usize)
     }
 
     /// Returns the free vertices, ascending.
@@ -42,7 +42,7 @@ impl DofMap {
     /// Returns the number of vertices, including pinned ones.
     #[must_use]
     pub fn vertex_count(&self) -> usize {
-        self.place.len()
+        self.rows.len()
     }
 
     /// Returns the entries of the free vertices.

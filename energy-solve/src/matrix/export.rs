@@ -60,9 +60,9 @@ impl<T> Bsr<T> {
     /// Calls `visit` with row, column and value of each number of `part`, by ascending rows and columns.
     fn for_each_number(&self, part: Storage, mut visit: impl FnMut(usize, usize, &T)) {
         for row in 0..3 * self.rows() {
-            for place in self.offsets[row / 3]..self.offsets[row / 3 + 1] {
-                for (axis, value) in self.blocks[place][row % 3].iter().enumerate() {
-                    let column = 3 * self.columns[place] + axis;
+            for slot in self.offsets[row / 3]..self.offsets[row / 3 + 1] {
+                for (axis, value) in self.blocks[slot][row % 3].iter().enumerate() {
+                    let column = 3 * self.columns[slot] + axis;
                     if part == Storage::Whole || row <= column {
                         visit(row, column, value);
                     }
@@ -90,8 +90,8 @@ impl<T: Precision> BlockMatrix<T> {
     /// // Two vertices joined by a spring of 3 N/m along x.
     /// let mut matrix = BlockMatrix::zeros(Pattern::from_stencils(Storage::Upper, 2, [&[0, 1][..]]).into());
     /// for (i, j, stiffness) in [(0, 0, 3.0), (0, 1, -3.0), (1, 1, 3.0)] {
-    ///     let (place, _) = matrix.pattern().place(i, j).expect("coupled");
-    ///     matrix.values_mut()[place][0][0] = stiffness;
+    ///     let (slot, _) = matrix.pattern().slot(i, j).expect("coupled");
+    ///     matrix.values_mut()[slot][0][0] = stiffness;
     /// }
     /// let csr = matrix.to_csr(Storage::Whole);
     /// assert_eq!((csr.rows(), csr.values.len()), (6, 36));

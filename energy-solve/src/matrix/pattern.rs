@@ -40,8 +40,8 @@ impl Pattern {
         for row in 0..rows {
             let named = start[row]..start[row + 1];
             columns[named.clone()].sort_unstable();
-            for place in named {
-                let column = columns[place];
+            for position in named {
+                let column = columns[position];
                 // Skip duplicates.
                 if end == row_start[row] as usize || columns[end - 1] != column {
                     if column == index(row) {
@@ -102,7 +102,7 @@ impl Pattern {
     /// Returns the index of block (row, column) and whether its transpose is stored instead; `None` if it is not in the
     /// pattern.
     #[must_use]
-    pub fn place(&self, row: usize, column: usize) -> Option<(usize, bool)> {
+    pub fn slot(&self, row: usize, column: usize) -> Option<(usize, bool)> {
         let flipped = self.storage == Storage::Upper && column < row;
         let (row, column) = if flipped { (column, row) } else { (row, column) };
         let (start, end) = (self.row_start[row] as usize, self.row_start[row + 1] as usize);
@@ -112,7 +112,7 @@ impl Pattern {
     /// Whether eliminating the rows in order creates fill-in. Chains in order do not fill in; sheets do.
     #[must_use]
     pub fn fills_in(&self) -> bool {
-        let coupled = |i: usize, j: usize| i == j || self.place(i, j).is_some();
+        let coupled = |i: usize, j: usize| i == j || self.slot(i, j).is_some();
         let later = |row: usize| self.row(row).map(|(_, column)| column).filter(move |&column| column > row);
         (0..self.rows()).any(|row| later(row).any(|i| later(row).any(|j| i < j && !coupled(i, j))))
     }
@@ -179,9 +179,9 @@ fn sorted_by_row(
     }
     let (mut columns, mut next) = (vec![0; start[rows]], start.clone());
     let mut put = |row: u32, column: u32| {
-        let place = &mut next[row as usize];
-        columns[*place] = column;
-        *place += 1;
+        let position = &mut next[row as usize];
+        columns[*position] = column;
+        *position += 1;
     };
     (0..index(rows)).for_each(|row| put(row, row));
     blocks.filter(|&(row, column)| is_stored(row, column)).for_each(|(row, column)| put(row, column));

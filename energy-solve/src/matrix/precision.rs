@@ -45,10 +45,10 @@ impl Blocks<'_> {
     ///
     /// # Panics
     /// If the index is out of range.
-    pub fn add(&mut self, place: usize, s: f64, block: &Block<f64>) {
+    pub fn add(&mut self, slot: usize, s: f64, block: &Block<f64>) {
         match self {
-            Self::Single(blocks) => add_scaled(&mut blocks[place], s, block),
-            Self::Double(blocks) => add_scaled(&mut blocks[place], s, block),
+            Self::Single(blocks) => add_scaled(&mut blocks[slot], s, block),
+            Self::Double(blocks) => add_scaled(&mut blocks[slot], s, block),
         }
     }
 }

@@ -95,8 +95,8 @@ fn restore<T: Copy>(runs: &[Range<u32>], blocks: &[Block<T>], first: usize, matr
     let mut done: usize = runs[..before].iter().map(ExactSizeIterator::len).sum();
     for run in &runs[before..] {
         let start = run.start as usize - first;
-        let Some(place) = matrix.get_mut(start..start + run.len()) else { break };
-        place.copy_from_slice(&blocks[done..][..run.len()]);
+        let Some(target) = matrix.get_mut(start..start + run.len()) else { break };
+        target.copy_from_slice(&blocks[done..][..run.len()]);
         done += run.len();
     }
 }
@@ -113,20 +113,20 @@ pub(super) fn coupled_runs<'a>(
         for i in stencil.clone().filter_map(&row) {
             for j in stencil.clone().filter_map(&row) {
                 if (pattern.storage() == Storage::Whole || i <= j)
-                    && let Some((place, _)) = pattern.place(i, j)
+                    && let Some((slot, _)) = pattern.slot(i, j)
                 {
-                    coupled[place] = true;
+                    coupled[slot] = true;
                 }
             }
         }
     }
     let mut runs: Vec<Range<u32>> = Vec::new();
     for row in 0..pattern.rows() {
-        let places = pattern.first_in(row)..pattern.first_in(row + 1);
-        for place in places.clone().filter(|&place| coupled[place]) {
+        let slots = pattern.first_in(row)..pattern.first_in(row + 1);
+        for slot in slots.clone().filter(|&slot| coupled[slot]) {
             match runs.last_mut() {
-                Some(run) if run.end as usize == place && place > places.start => run.end += 1,
-                _ => runs.push(index(place)..index(place + 1)),
+                Some(run) if run.end as usize == slot && slot > slots.start => run.end += 1,
+                _ => runs.push(index(slot)..index(slot + 1)),
             }
         }
     }

@@ -4,6 +4,7 @@ use crate::terms::term::Quantity;
 
 /// An element that does not fit the vertices of its system.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum SystemError {
     /// An element acts on a vertex that does not exist.
     #[error(
@@ -24,6 +25,7 @@ pub enum SystemError {
 
 /// A sum that could not be evaluated.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum EvaluationError {
     /// The number of positions or velocities is not the number of vertices.
     #[error("the system has {expected} vertices, but {found} {what} were given")]

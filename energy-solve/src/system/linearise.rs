@@ -29,6 +29,7 @@ pub struct LinearisedForces {
 
 /// Options of [`System::linearise`].
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct LinearisationOptions {
     /// α and β.
     pub weights: Weights,
@@ -36,6 +37,20 @@ pub struct LinearisationOptions {
     pub curvature: Curvature,
     /// Whether to compute (∂f/∂x) v.
     pub stiffness_times_velocity: bool,
+}
+
+impl LinearisationOptions {
+    /// Creates options that do not compute (∂f/∂x) v.
+    #[must_use]
+    pub const fn new(weights: Weights, curvature: Curvature) -> Self {
+        Self { weights, curvature, stiffness_times_velocity: false }
+    }
+
+    /// Sets whether to compute (∂f/∂x) v.
+    #[must_use]
+    pub const fn with_stiffness_times_velocity(self, stiffness_times_velocity: bool) -> Self {
+        Self { stiffness_times_velocity, ..self }
+    }
 }
 
 impl System {
@@ -191,7 +206,7 @@ impl System {
         let changing = terms.filter(|term| term.character().curved && !is_constant(*term));
         let runs = coupled_runs(
             &self.pattern,
-            |vertex| self.dofs.place(vertex as usize),
+            |vertex| self.dofs.row(vertex as usize),
             changing.map(TermDescription::stencils),
         );
         Arc::clone(self.changing.insert(runs))

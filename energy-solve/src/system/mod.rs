@@ -72,7 +72,7 @@ impl System {
         let curved = terms.iter().filter(|term| term.character().curved);
         let (mut coupled, mut ends) = (Vec::new(), vec![0]);
         for stencil in curved.flat_map(|term| term.stencils().iter()) {
-            coupled.extend(stencil.filter_map(|vertex| dofs.place(vertex as usize)).map(index));
+            coupled.extend(stencil.filter_map(|vertex| dofs.row(vertex as usize)).map(index));
             ends.push(coupled.len());
         }
         let stencils = ends.windows(2).map(|ends| &coupled[ends[0]..ends[1]]);
@@ -121,8 +121,8 @@ impl System {
         terms.map(|term| term.divisible().map(|divisible| (divisible, wanted(term)))).collect()
     }
 
-    /// Adds contact. The sums of this system do not include it: an integrator adds it with [`System::contact`], because
-    /// contact also limits the moves that lead from state to state.
+    /// Adds contact. The sums of this system do not include it. An integrator takes it for each step, because contact
+    /// also limits the moves that lead from state to state.
     pub fn set_contact(&mut self, mut contact: Box<dyn ContactModel>) {
         contact.set_threads(self.threads);
         self.contact = Some(contact);
@@ -131,11 +131,6 @@ impl System {
     /// Removes and returns the contact, if there is one.
     pub fn take_contact(&mut self) -> Option<Box<dyn ContactModel>> {
         self.contact.take()
-    }
-
-    /// Returns the contact and the map between vertices and rows; `None` if the body does not collide.
-    pub fn contact(&mut self) -> Option<(&mut (dyn ContactModel + 'static), &DofMap)> {
-        Some((&mut **self.contact.as_mut()?, &self.dofs))
     }
 
     /// Returns the energy of the contacts of the last step at x, in J; `None` if the body does not collide.
@@ -148,6 +143,13 @@ impl System {
     #[must_use]
     pub fn contact_memory(&self, x: &[Vector3<f64>]) -> ContactMemory {
         self.contact.as_ref().map_or_else(ContactMemory::default, |contact| contact.memory(x))
+    }
+
+    /// Restores what contact keeps from step to step.
+    pub fn restore_contact(&mut self, memory: ContactMemory) {
+        if let Some(contact) = &mut self.contact {
+            contact.restore(memory);
+        }
     }
 
     /// Adds the forces of the contacts of the last step at x, in N.

@@ -11,9 +11,7 @@ use crate::threads::for_each;
 impl System {
     /// Returns the system of the chosen free vertices; all others count as pinned. It evaluates only elements with a
     /// chosen vertex, so its energies differ from those of this system by constants. `None` if a term cannot be
-    /// restricted; see [`PlacedTerm::restricted`](crate::PlacedTerm::restricted).
-    ///
-    /// Contact moves to the restricted system until [`System::rejoin`]. No step may begin or end before that.
+    /// restricted; see [`PlacedTerm::restricted`](crate::PlacedTerm::restricted). It has no contact.
     ///
     /// # Panics
     /// If there is not one entry per vertex.
@@ -30,20 +28,11 @@ impl System {
         };
         let terms = for_each(self.threads, self.terms.iter_mut().collect(), restricted);
         let terms = terms.into_iter().collect::<Option<_>>()?;
-        let mut system = Self::with_placed(terms, dofs, Arc::new(pattern), self.threads);
-        system.contact = self.contact.take();
-        if let Some(contact) = &mut system.contact {
-            contact.restrict(chosen);
-        }
-        Some(system)
+        Some(Self::with_placed(terms, dofs, Arc::new(pattern), self.threads))
     }
 
-    /// Takes contact back from a restricted system, and adds its evaluation counts.
+    /// Adds the evaluation counts of a restricted system.
     pub fn rejoin(&mut self, restricted: Self) {
-        self.contact = restricted.contact;
-        if let Some(contact) = &mut self.contact {
-            contact.release();
-        }
         for (whole, Counted { counts, .. }) in self.terms.iter_mut().zip(restricted.terms) {
             // The other elements do not count as skipped: nothing asked for them.
             let asked = |tally: Tally| Tally { skipped: 0, ..tally };

@@ -16,7 +16,7 @@ pub(crate) struct Active {
 
 impl Active {
     pub(crate) fn new(stencils: Stencils<'_>, dofs: &DofMap) -> Self {
-        let is_free = |vertex: u32| dofs.place(vertex as usize).is_some();
+        let is_free = |vertex: u32| dofs.row(vertex as usize).is_some();
         let active = || (0..stencils.len()).filter(|&element| stencils.stencil(element).any(is_free));
         let count = active().count();
         let indices = (count < stencils.len()).then(|| active().map(index).collect());

@@ -25,6 +25,7 @@ impl AddAssign for Tally {
 
 /// Evaluation counts of one term since its system was created.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Counts {
     /// Evaluations of the value alone.
     pub value: Tally,

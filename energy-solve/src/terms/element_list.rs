@@ -5,6 +5,7 @@ use crate::terms::stencils::Stencils;
 
 /// Stencils that do not fit their elements.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum ListError {
     /// The numbers of stencils and elements differ.
     #[error("{list}: expected one stencil per element, got {stencils} stencils for {elements} elements")]

@@ -11,8 +11,8 @@ use crate::terms::active::{Active, points_of};
 use crate::terms::counts::Tally;
 use crate::terms::element_list::ElementList;
 use crate::terms::linearisation::Linearisation;
-use crate::terms::places::Places;
 use crate::terms::restriction::Restriction;
+use crate::terms::scatter_map::ScatterMap;
 use crate::terms::state::State;
 use crate::terms::stencils::Stencils;
 use crate::terms::term::{Character, MadeFromTerm, PlacedTerm, Quantity, Term, TermDescription};
@@ -74,12 +74,12 @@ impl<E: ForceLaw<f64> + Debug + Send + Sync + 'static> Term for ForceTerm<E> {
     fn place(self: Box<Self>, dofs: &DofMap, pattern: &Pattern) -> Box<dyn PlacedTerm> {
         let n = self.list.arity();
         let active = Active::new(self.list.stencils(), dofs);
-        let (mut pairs, mut places) = (Vec::new(), Places::default());
+        let (mut pairs, mut maps) = (Vec::new(), ScatterMap::default());
         if self.character().curved {
             pairs = (0..n).flat_map(|i| (0..n).map(move |j| (i, j))).collect();
-            places = Places::new(&active, self.list.stencils(), &pairs, dofs, pattern);
+            maps = ScatterMap::new(&active, self.list.stencils(), &pairs, dofs, pattern);
         }
-        Box::new(PlacedForceTerm { term: self.into(), active, places, pairs })
+        Box::new(PlacedForceTerm { term: self.into(), active, maps, pairs })
     }
 }
 
@@ -88,7 +88,7 @@ impl<E: ForceLaw<f64> + Debug + Send + Sync + 'static> Term for ForceTerm<E> {
 struct PlacedForceTerm<E: ForceLaw<f64>> {
     term: Arc<ForceTerm<E>>,
     active: Active,
-    places: Places,
+    maps: ScatterMap,
     /// The pairs of points whose blocks are stored.
     pairs: Vec<(usize, usize)>,
 }
@@ -115,9 +115,9 @@ impl<E: ForceLaw<f64>> PlacedForceTerm<E> {
     /// Adds an element's blocks to the matrix. If the pattern stores a pair of blocks as one, adds only the block that
     /// is not transposed.
     fn add_blocks(&self, number: usize, weight: f64, blocks: &[Block<f64>], matrix: &mut Blocks<'_>) {
-        let slots = self.places.of(number..number + 1);
+        let slots = self.maps.of(number..number + 1);
         for (pair, block) in blocks.iter().enumerate() {
-            if self.places.transposed(number, pair) & 1 == 0 {
+            if self.maps.transposed(number, pair) & 1 == 0 {
                 matrix.add(slots[pair] as usize, weight, block);
             }
         }
@@ -134,8 +134,8 @@ impl<E: ForceLaw<f64> + Debug + Send + Sync + 'static> PlacedTerm for PlacedForc
     fn restricted(&self, restriction: &Restriction<'_>) -> Option<Box<dyn PlacedTerm>> {
         let numbers = restriction.remaining(self.active.iter(), self.stencils());
         let active = Active::some(numbers.iter().map(|&number| index(self.active.element(number))).collect());
-        let places = self.places.restricted(&numbers, restriction);
-        Some(Box::new(Self { term: Arc::clone(&self.term), active, places, pairs: self.pairs.clone() }))
+        let maps = self.maps.restricted(&numbers, restriction);
+        Some(Box::new(Self { term: Arc::clone(&self.term), active, maps, pairs: self.pairs.clone() }))
     }
 
     fn dissipation(&self, state: State<'_>) -> Option<(f64, Tally)> {

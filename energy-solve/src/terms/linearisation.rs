@@ -19,7 +19,7 @@ pub struct Linearisation<'a> {
     pub weights: Weights,
     /// Treatment of negative eigenvalues.
     pub curvature: Curvature,
-    /// Blocks of α ∂f/∂x + β ∂f/∂v, by [`Pattern::place`](crate::Pattern::place). One more, at
+    /// Blocks of α ∂f/∂x + β ∂f/∂v, by [`Pattern::slot`](crate::Pattern::slot). One more, at
     /// [`Pattern::nowhere`](crate::Pattern::nowhere), collects the blocks of pinned vertices.
     pub matrix: Blocks<'a>,
     /// f of all vertices, in N.

@@ -7,10 +7,10 @@ mod element_list;
 mod force_term;
 pub(crate) mod linearisation;
 mod own_term;
-mod places;
 mod potential;
 pub(crate) mod restriction;
 mod scatter;
+mod scatter_map;
 pub(crate) mod share;
 pub(crate) mod state;
 pub(crate) mod stencils;
@@ -22,12 +22,12 @@ pub use element_list::{ElementList, ListError};
 pub use force_term::ForceTerm;
 pub use linearisation::{Linearisation, Weights};
 pub use own_term::{Order, OwnLaw, OwnResults, OwnTerm};
-pub use places::BlockPlaces;
 pub use potential::{
     DissipationLaw, DissipationTerm, DrivenLaw, DrivenTerm, PotentialTerm, SteeredTapeTerm, SteeredTapes, TapeTerm,
 };
 pub use restriction::Restriction;
 pub use scatter::TriangleBuffer;
+pub use scatter_map::ScatterMaps;
 pub use share::{Divisible, Share};
 pub use state::{State, StepStart};
 pub use stencils::Stencils;

@@ -109,12 +109,12 @@ impl<L: OwnLaw + 'static> Term for OwnTerm<L> {
     fn place(self: Box<Self>, dofs: &DofMap, pattern: &Pattern) -> Box<dyn PlacedTerm> {
         let curved = self.character().curved;
         let (n, stencils) = (self.stencils().arity(), self.stencils());
-        let row = |element: usize, point: usize| dofs.place(stencils.vertex(element, point) as usize);
+        let row = |element: usize, point: usize| dofs.row(stencils.vertex(element, point) as usize);
         let mut slots = Vec::new();
         for element in 0..if curved { stencils.len() } else { 0 } {
             for (i, j) in (0..n).flat_map(|i| (0..n).map(move |j| (i, j))) {
-                let place = row(element, i).zip(row(element, j)).and_then(|(i, j)| pattern.place(i, j));
-                slots.push(place.and_then(|(slot, transposed)| (!transposed).then_some(slot)));
+                let found = row(element, i).zip(row(element, j)).and_then(|(i, j)| pattern.slot(i, j));
+                slots.push(found.and_then(|(slot, transposed)| (!transposed).then_some(slot)));
             }
         }
         let found = AtomicU64::new(f64::NAN.to_bits());

@@ -3,7 +3,7 @@ use crate::terms::stencils::Stencils;
 
 /// A choice of free vertices of a system; the others are fixed.
 ///
-/// [`PlacedTerm::restricted`](crate::PlacedTerm::restricted) uses it to find the elements that remain, and the places
+/// [`PlacedTerm::restricted`](crate::PlacedTerm::restricted) uses it to find the elements that remain, and the slots
 /// of their blocks in the smaller matrix.
 #[derive(Debug)]
 pub struct Restriction<'a> {
@@ -15,7 +15,7 @@ pub struct Restriction<'a> {
 impl Restriction<'_> {
     /// Returns the elements, among those with these indices, that have a chosen vertex, as positions in `elements`.
     pub fn remaining(&self, elements: impl Iterator<Item = usize>, stencils: Stencils<'_>) -> Vec<usize> {
-        let is_chosen = |vertex: u32| self.dofs.place(vertex as usize).is_some();
+        let is_chosen = |vertex: u32| self.dofs.row(vertex as usize).is_some();
         let remains = |&(_, element): &(usize, usize)| stencils.stencil(element).any(is_chosen);
         elements.enumerate().filter(remains).map(|(position, _)| position).collect()
     }

@@ -4,7 +4,7 @@
 use energy_dsl::{BLOCK, Block, Lane, Mask, Vector3, triangle_index};
 
 use crate::matrix::precision::{Blocks, Precision};
-use crate::terms::places::{BlockPlaces, Places};
+use crate::terms::scatter_map::{ScatterMap, ScatterMaps};
 
 /// Elements that are evaluated together, one per lane.
 #[derive(Clone, Copy, Debug)]
@@ -94,16 +94,16 @@ impl TriangleBuffer {
     #[inline(always)]
     pub fn scatter<V: Lane<f64>>(
         &mut self,
-        places: &BlockPlaces,
+        maps: &ScatterMaps,
         (first, count): (usize, usize),
         scale: V,
         triangle: &mut [[Vector3<V>; 3]],
         (first_block, matrix): (usize, &mut Blocks<'_>),
     ) {
-        turn(&places.upper, first, triangle);
+        turn(&maps.upper, first, triangle);
         self.fill(scale, triangle);
         let (pairs, elements) = (triangle.len(), first..first + count);
-        let (slots, mirrored) = (places.upper.of(elements.clone()), places.mirrored.of(elements));
+        let (slots, mirrored) = (maps.upper.of(elements.clone()), maps.mirrored.of(elements));
         match matrix {
             Blocks::Single(matrix) => self.add_to(pairs, slots, mirrored, first_block, matrix),
             Blocks::Double(matrix) => self.add_to(pairs, slots, mirrored, first_block, matrix),
@@ -171,9 +171,9 @@ impl TriangleBuffer {
 
 /// Transposes the blocks (i, j) that are stored as (j, i).
 #[inline(always)]
-fn turn<V: Lane<f64>>(places: &Places, first: usize, triangle: &mut [[Vector3<V>; 3]]) {
+fn turn<V: Lane<f64>>(maps: &ScatterMap, first: usize, triangle: &mut [[Vector3<V>; 3]]) {
     for pair in 0..triangle.len() {
-        let bits = places.transposed(first, pair);
+        let bits = maps.transposed(first, pair);
         if bits != 0 {
             let turned = V::Mask::from_bits(bits);
             let block = &mut triangle[pair];

@@ -13,7 +13,7 @@ pub struct Share {
     pub number: usize,
     /// Range of vertices.
     pub vertices: Range<usize>,
-    /// Range of blocks, by [`Pattern::place`](crate::Pattern::place).
+    /// Range of blocks, by [`Pattern::slot`](crate::Pattern::slot).
     pub blocks: Range<usize>,
 }
 

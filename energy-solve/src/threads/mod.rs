@@ -1,8 +1,8 @@
 //! Work divided among threads. The results do not depend on the number of threads.
 
 mod barrier;
-mod meeting;
 mod pool;
+mod rendezvous;
 mod results;
 
 use std::ops::Range;
@@ -11,9 +11,9 @@ use std::sync::Mutex;
 use rayon_core::ThreadPool;
 
 pub(crate) use barrier::SpinBarrier;
-pub(crate) use meeting::in_parts;
 pub use pool::in_pool;
 use pool::{pool, spin_while, with_helpers};
+pub(crate) use rendezvous::in_parts;
 use results::Results;
 
 /// Applies `work` to every item on at most `threads` threads, including the calling one. Each thread takes one item

@@ -15,6 +15,7 @@ const LARGEST_FILE: u64 = 256 << 20;
 
 /// A glTF file without a usable skinned body.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum GltfError {
     /// The file cannot be read.
     #[error("{}", .path.display())]

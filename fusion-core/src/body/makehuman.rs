@@ -11,6 +11,7 @@ use crate::json_file::{JsonFileError, read_json};
 
 /// Files that do not describe a body.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum MakeHumanError {
     /// The mesh cannot be read or is malformed.
     #[error(transparent)]

@@ -22,6 +22,7 @@ pub const FARTHEST: f64 = 1e9;
 
 /// A body that cannot be used.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum BodyError {
     /// The mesh is empty.
     #[error("the body has no vertices or no triangles")]

@@ -10,6 +10,7 @@ use crate::json_file::{JsonFileError, read_json, write_json};
 
 /// A file of a body or mesh that cannot be used.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum BodyFileError {
     /// A stored body cannot be read or written, or is malformed.
     #[error(transparent)]

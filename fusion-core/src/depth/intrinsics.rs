@@ -83,6 +83,7 @@ impl GivenCamera {
 /// A name that is unknown, or numbers that do not describe a camera.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("expected `fx,fy,cx,cy` in pixels, or one of freiburg1, freiburg2, freiburg3, got `{0}`")]
+#[non_exhaustive]
 pub struct CameraNameError(String);
 
 /// Calibration of the colour cameras, to which the TUM's depth images are registered, from

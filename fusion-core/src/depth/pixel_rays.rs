@@ -4,6 +4,7 @@ use super::camera::Camera;
 
 /// A camera whose pixels have no rays.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum LensError {
     /// A parameter is invalid.
     #[error("{0}")]

@@ -6,6 +6,7 @@ use super::image::DepthImage;
 
 /// An image that cannot be read or written.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum DepthFileError {
     /// The file cannot be read or written.
     #[error("{}", .path.display())]

@@ -12,6 +12,7 @@ const LARGEST_LIST: u64 = 64 << 20;
 
 /// A folder that is not a sequence of depth images.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum SequenceError {
     /// The list of images cannot be read.
     #[error("{}", .path.display())]

@@ -22,6 +22,7 @@ use crate::twist::{Twist, blended};
 
 /// An energy that cannot be created.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum EnergyError {
     /// There are fewer bones than the four that a declared residual blends.
     #[error("expected at least four bones if bones are unknowns, got {0}")]

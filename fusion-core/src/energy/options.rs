@@ -88,6 +88,7 @@ pub enum BoneMode {
 /// Options of the energy.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
+#[non_exhaustive]
 pub struct EnergyOptions {
     /// Weights λ of the terms.
     pub weights: TermWeights,

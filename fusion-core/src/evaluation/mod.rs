@@ -9,6 +9,7 @@ pub use self::surface_distance::SurfaceDistance;
 
 /// Statistics of end-point errors, in mm.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct ErrorSummary {
     /// Number of vertices.
     pub count: usize,

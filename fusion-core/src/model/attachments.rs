@@ -11,6 +11,7 @@ pub struct Attachments {
 
 /// Statistics of a fill.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct FillReport {
     /// Number of passes that assigned a node.
     pub passes: usize,

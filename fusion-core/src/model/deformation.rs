@@ -66,6 +66,7 @@ impl ModelOptions {
 
 /// A body for which no model can be created.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum ModelError {
     /// K is not 1, 4 or 8.
     #[error("expected 1, 4 or 8 nodes per vertex, got {0}")]

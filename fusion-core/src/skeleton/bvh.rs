@@ -10,6 +10,7 @@ const LARGEST_NUMBER: f64 = 1e9;
 
 /// A file that is not a BVH motion.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum BvhError {
     /// The file cannot be read.
     #[error("cannot read {}", .path.display())]

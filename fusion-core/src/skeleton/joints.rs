@@ -13,6 +13,7 @@ use crate::json_file::{JsonFileError, read_json};
 
 /// A file of joints that cannot be used.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum JointTrackError {
     /// The file cannot be read or is malformed.
     #[error(transparent)]

@@ -5,6 +5,7 @@ use crate::body::Bone;
 
 /// A motion that does not fit a body.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum RetargetError {
     /// No joint of the motion has the name of a bone.
     #[error("no joint of the motion has the name of a bone; its root is `{root}`, the body's is `{bone}`")]

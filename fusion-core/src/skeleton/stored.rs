@@ -10,6 +10,7 @@ use crate::json_file::{JsonFileError, read_json, write_json};
 
 /// A file of a skeleton that cannot be used.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum SkeletonError {
     /// The file cannot be read or written, or is malformed.
     #[error(transparent)]

@@ -14,6 +14,7 @@ use crate::silhouette::BodyView;
 /// Options of a [`SurfaceVolume`].
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
+#[non_exhaustive]
 pub struct SurfaceOptions {
     /// Distance between voxels, in m.
     pub voxel: f64,
@@ -34,6 +35,7 @@ impl Default for SurfaceOptions {
 
 /// A volume that cannot be created.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum SurfaceError {
     /// An option cannot be used.
     #[error(transparent)]

@@ -66,8 +66,8 @@ impl Tracker {
             }
             None => NormalSolverKind::Cholesky,
         };
-        let steps =
-            GaussNewtonOptions { damping: options.damping, solver, two_threads: true, ..GaussNewtonOptions::default() };
+        let mut steps = GaussNewtonOptions::default();
+        (steps.damping, steps.solver, steps.two_threads) = (options.damping, solver, true);
         let solver = GaussNewton::new(energy.pattern().clone(), steps)?;
         let twists = vec![[0.0; 6]; energy.pattern().rows()];
         let offsets = vec![Isometry3::identity(); model.nodes.len()];

@@ -9,6 +9,7 @@ use crate::option_error::OptionError;
 /// Options of a [`Tracker`](super::Tracker).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
+#[non_exhaustive]
 pub struct TrackerOptions {
     /// Options of the energy.
     pub energy: EnergyOptions,

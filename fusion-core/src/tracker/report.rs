@@ -7,6 +7,7 @@ use crate::option_error::OptionError;
 
 /// A tracker that cannot be created.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum TrackerError {
     /// An option cannot be used.
     #[error(transparent)]
@@ -24,6 +25,7 @@ pub enum TrackerError {
 
 /// The reason why a frame's image was not used.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum FrameError {
     /// The image and the camera have different sizes.
     #[error("expected an image of {expected:?} pixels, got {found:?}")]
@@ -71,6 +73,7 @@ pub enum FrameError {
 
 /// Statistics of one frame.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct FrameReport {
     /// Results of the last search for correspondences.
     pub counts: MatchCounts,

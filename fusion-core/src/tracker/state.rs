@@ -21,6 +21,7 @@ pub struct TrackerState {
 
 /// A state that does not fit the tracker.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum TrackerStateError {
     /// The state is that of another model.
     #[error("the state has {found} {what}, the tracker {expected}; it belongs to another model or other options")]

@@ -193,7 +193,8 @@ static STOPPED: LazyLock<[Stopped; 3]> = LazyLock::new(|| [SMALL, IN_CONTACT, WI
 
 fn stopped(scene: &str) -> Stopped {
     let folder = tempfile::tempdir().expect("the folder of temporary files can be written to");
-    let options = RunOptions { checkpoint_interval: Some(1), ignore_memory: true, ..RunOptions::default() };
+    let mut options = RunOptions::default();
+    (options.checkpoint_interval, options.ignore_memory) = (Some(1), true);
     let run = Run::new(scene.to_owned(), &scene_path(), folder.path(), options);
     let (mut run, stop) = (run.expect("the scene is valid").with_threads(1), AtomicBool::new(false));
     let mut steps = 0;

@@ -20,7 +20,7 @@ pub(crate) const DECLARATIONS: Target = Target {
 };
 
 /// A hundredth of the usual budget, so that thousands of inputs take a minute.
-const LIMITS: Limits = Limits { steps: 200_000, bytes: 40_000_000 };
+const LIMITS: Limits = Limits::new(200_000, 40_000_000);
 
 const BEFORE: &str = "#[limits(steps = 2e5, bytes = 4e7)] energy E(p, q: Point; k: Scalar, L: Scalar[m])";
 

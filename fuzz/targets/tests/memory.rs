@@ -31,7 +31,11 @@ fn read(reader: &str, path: &Path) -> bool {
     let beside = |name| path.with_file_name(name);
     match reader {
         "cloth" => read_obj_surface(path, ObjOptions::default()).is_ok(),
-        "welded" => read_obj_surface(path, ObjOptions { groups: None, weld: Some(1e-6) }).is_ok(),
+        "welded" => {
+            let mut options = ObjOptions::default();
+            options.weld = Some(1e-6);
+            read_obj_surface(path, options).is_ok()
+        }
         "body" => read_obj(path).is_ok(),
         "human" => read_makehuman(path, &beside("rig.json"), &beside("weights.json")).is_ok(),
         "glTF" => read_gltf(path).is_ok(),

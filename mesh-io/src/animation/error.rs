@@ -1,5 +1,6 @@
 /// An animation that cannot be encoded.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum AnimationError {
     /// The file exceeds 4 GiB, the limit of binary glTF.
     #[error("the animation would take {bytes} bytes, but a .glb file holds less than 4 GiB; write fewer frames")]

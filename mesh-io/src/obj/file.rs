@@ -21,6 +21,7 @@ pub const LARGEST_UV: f64 = 1e9;
 /// An OBJ file that cannot be read.
 #[derive(Debug, thiserror::Error)]
 #[expect(missing_docs, reason = "the messages name the fields")]
+#[non_exhaustive]
 pub enum ObjFileError {
     /// The file cannot be read.
     #[error("cannot read {}", .path.display())]

@@ -48,7 +48,8 @@ pub fn run(
     threads: Option<usize>,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<u64> {
-    let options = RunOptions { overwrite, checkpoint_interval: checkpoint, ignore_memory };
+    let mut options = RunOptions::default();
+    (options.overwrite, options.checkpoint_interval, options.ignore_memory) = (overwrite, checkpoint, ignore_memory);
     let text = toml_text(text)?;
     to_the_end(py, threads, progress, || {
         Run::new(text.clone(), Path::new(path), Path::new(output), options).map_err(|error| {

@@ -177,11 +177,10 @@ impl Assembly {
             factor => self.masses.iter().map(|mass| factor * mass).collect(),
         };
         let (sum, matrix) = self.sum(state)?;
-        let options = LinearisationOptions {
-            weights: Weights { position: wanted.position, velocity: wanted.velocity },
-            curvature: wanted.curvature,
-            stiffness_times_velocity: false,
-        };
+        let options = LinearisationOptions::new(
+            Weights { position: wanted.position, velocity: wanted.velocity },
+            wanted.curvature,
+        );
         let forces = sum.linearise_with_masses(state, options, &masses, matrix).map_err(Failure::Evaluation)?;
         Ok(forces.force)
     }

@@ -10,6 +10,7 @@ use crate::read::{is_same, open_state};
 
 /// A folder that cannot be locked.
 #[derive(Debug)]
+#[non_exhaustive]
 pub enum LockError {
     /// Another process writes to the folder.
     InUse {

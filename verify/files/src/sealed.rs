@@ -22,6 +22,7 @@ pub struct Seal {
 
 /// Contents that cannot be opened.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum SealError {
     /// The file is of another kind.
     Foreign,

@@ -239,6 +239,7 @@ pub struct Spot {
 
 /// A loss of digits near rest or near a singularity, or a needless flag. It does not fail an audit.
 #[derive(Clone, Debug, Serialize)]
+#[non_exhaustive]
 pub struct Warning {
     /// Name of the block.
     pub block: BlockName,
@@ -307,6 +308,7 @@ pub struct Section {
 
 /// The audit of one or more elements.
 #[derive(Clone, Debug, Default, Serialize)]
+#[non_exhaustive]
 pub struct Report {
     /// Lines, element by element.
     pub lines: Vec<Line>,

@@ -23,7 +23,7 @@ pub(super) struct Bristles {
     names: Vec<[u32; 3]>,
     /// The normal and the deflection (in m) of each pair.
     vectors: Vec<[Vector3<f64>; 2]>,
-    /// The places of pairs of edges, by their second edge.
+    /// The numbers of pairs of edges, by their second edge.
     by_second_edge: Vec<u32>,
 }
 
@@ -34,31 +34,31 @@ fn name(pair: &Pair) -> [u32; 3] {
 }
 
 impl Bristles {
-    /// Takes the pairs in order, each with its normal and the way that it has slid, in m.
+    /// Takes the pairs in order, each with its normal and its tangential displacement, in m.
     pub fn new(pairs: impl Iterator<Item = (Pair, Vector3<f64>, Vector3<f64>)>) -> Self {
-        Self::in_order(pairs.map(|(pair, normal, way)| (name(&pair), [normal, shortened(way)])).unzip())
+        Self::in_order(pairs.map(|(pair, normal, displacement)| (name(&pair), [normal, limited(displacement)])).unzip())
     }
 
     /// Returns the deflection of a pair, in m, across its normal. A point that has moved on to another triangle, or an
     /// edge to another edge, keeps its deflection. If the second edge is an obstacle's, it may touch many edges, which
     /// do not keep that of each other.
     pub fn deflection(&self, pair: &Pair, normal: Vector3<f64>, is_on_obstacle: bool) -> Vector3<f64> {
-        let known = match self.names.binary_search(&name(pair)) {
-            Ok(place) => Some(place),
+        let found = match self.names.binary_search(&name(pair)) {
+            Ok(number) => Some(number),
             Err(_) => self.similar(pair, normal, is_on_obstacle),
         };
-        known.map_or([0.0; 3], |place| {
-            let [_, deflection] = self.vectors[place];
+        found.map_or([0.0; 3], |number| {
+            let [_, deflection] = self.vectors[number];
             add_scaled(deflection, -dot(deflection, normal), normal)
         })
     }
 
     /// The pair with the same point, or a common edge, and the most similar normal, if it is similar at all.
     fn similar(&self, pair: &Pair, normal: Vector3<f64>, is_on_obstacle: bool) -> Option<usize> {
-        let cosine = |place: &usize| dot(self.vectors[*place][0], normal);
+        let cosine = |number: &usize| dot(self.vectors[*number][0], normal);
         let with_second = (!is_on_obstacle).then(|| self.with_second_edge(pair));
         let candidates = self.with_first_feature(pair).chain(with_second.into_iter().flatten());
-        candidates.filter(|place| cosine(place) > SAME_CONTACT).max_by(|a, b| cosine(a).total_cmp(&cosine(b)))
+        candidates.filter(|number| cosine(number) > SAME_CONTACT).max_by(|a, b| cosine(a).total_cmp(&cosine(b)))
     }
 
     fn with_first_feature(&self, pair: &Pair) -> Range<usize> {
@@ -69,17 +69,17 @@ impl Bristles {
     }
 
     fn with_second_edge(&self, pair: &Pair) -> impl Iterator<Item = usize> {
-        let second = |place: &u32| self.names[*place as usize][2];
+        let second = |number: &u32| self.names[*number as usize][2];
         let [kind, _, edge] = name(pair);
-        let places = if kind == EDGES { &self.by_second_edge[..] } else { &[] };
-        let first = places.partition_point(|place| second(place) < edge);
-        places[first..].iter().take_while(move |place| second(place) == edge).map(|place| *place as usize)
+        let numbers = if kind == EDGES { &self.by_second_edge[..] } else { &[] };
+        let first = numbers.partition_point(|number| second(number) < edge);
+        numbers[first..].iter().take_while(move |number| second(number) == edge).map(|number| *number as usize)
     }
 
     fn in_order((names, vectors): (Vec<[u32; 3]>, Vec<[Vector3<f64>; 2]>)) -> Self {
         let first = names.partition_point(|[kind, ..]| *kind < EDGES);
         let mut by_second_edge: Vec<u32> = (first..names.len()).map(index).collect();
-        by_second_edge.sort_by_key(|place| names[*place as usize][2]);
+        by_second_edge.sort_by_key(|number| names[*number as usize][2]);
         Self { names, vectors, by_second_edge }
     }
 
@@ -99,10 +99,10 @@ impl Bristles {
     }
 }
 
-/// Shortens a way to the length of a bristle.
-fn shortened(way: Vector3<f64>) -> Vector3<f64> {
-    let length = norm(way);
-    if length > LENGTH { way.map(|component| LENGTH / length * component) } else { way }
+/// Limits a displacement to the length of a bristle.
+fn limited(displacement: Vector3<f64>) -> Vector3<f64> {
+    let length = norm(displacement);
+    if length > LENGTH { displacement.map(|component| LENGTH / length * component) } else { displacement }
 }
 
 #[cfg(test)]
@@ -117,8 +117,9 @@ mod tests {
 
     #[test]
     fn deflections_are_short_and_lie_across_the_normal() {
-        let ways = [([3, 1], [5e-5, 0.0, 0.0]), ([3, 4], [0.0, 1.0, 0.0])];
-        let bristles = Bristles::new(ways.into_iter().map(|(features, way)| (pair(features), UP, way)));
+        let displacements = [([3, 1], [5e-5, 0.0, 0.0]), ([3, 4], [0.0, 1.0, 0.0])];
+        let bristles =
+            Bristles::new(displacements.into_iter().map(|(features, displacement)| (pair(features), UP, displacement)));
         assert_eq!(bristles.deflection(&pair([3, 1]), UP, false), [5e-5, 0.0, 0.0]);
         assert_eq!(bristles.deflection(&pair([3, 4]), UP, false), [0.0, LENGTH, 0.0]);
         assert_eq!(bristles.deflection(&pair([3, 1]), [0.6, 0.0, 0.8], false)[0], 5e-5 * 0.64);
@@ -127,8 +128,10 @@ mod tests {
     #[test]
     fn a_point_that_moves_on_keeps_its_deflection() {
         let turned = [0.6, 0.0, 0.8];
-        let ways = [([3, 1], UP, [0.0, 5e-5, 0.0]), ([3, 4], turned, [0.0, 7e-5, 0.0])];
-        let bristles = Bristles::new(ways.into_iter().map(|(features, normal, way)| (pair(features), normal, way)));
+        let displacements = [([3, 1], UP, [0.0, 5e-5, 0.0]), ([3, 4], turned, [0.0, 7e-5, 0.0])];
+        let bristles = Bristles::new(
+            displacements.into_iter().map(|(features, normal, displacement)| (pair(features), normal, displacement)),
+        );
         assert_eq!(bristles.deflection(&pair([3, 2]), UP, false), [0.0, 5e-5, 0.0]);
         assert_eq!(bristles.deflection(&pair([3, 9]), turned, false), [0.0, 7e-5, 0.0]);
         for (features, normal) in [([2, 1], UP), ([4, 1], UP), ([3, 2], [0.0, 0.0, -1.0])] {
@@ -139,8 +142,10 @@ mod tests {
     #[test]
     fn either_edge_of_a_pair_may_move_on() {
         let pair = |features: [u32; 2]| Pair { kind: PairKind::EdgeEdge, ..pair(features) };
-        let ways = [([3, 7], UP, [0.0, 5e-5, 0.0]), ([4, 6], [0.0, 0.0, -1.0], [0.0, 7e-5, 0.0])];
-        let bristles = Bristles::new(ways.into_iter().map(|(features, normal, way)| (pair(features), normal, way)));
+        let displacements = [([3, 7], UP, [0.0, 5e-5, 0.0]), ([4, 6], [0.0, 0.0, -1.0], [0.0, 7e-5, 0.0])];
+        let bristles = Bristles::new(
+            displacements.into_iter().map(|(features, normal, displacement)| (pair(features), normal, displacement)),
+        );
         for bristles in [Bristles::restored(bristles.clone().memory()), bristles] {
             for features in [[3, 7], [3, 8], [2, 7]] {
                 assert_eq!(bristles.deflection(&pair(features), UP, false), [0.0, 5e-5, 0.0], "{features:?}");

@@ -25,19 +25,19 @@ const VALLEY: f64 = 0.3;
 /// ends and the triangles suffice.
 const PARALLEL: f64 = 0.01;
 
-/// Decides which pairs become contacts at x.
-pub(super) struct Meeting<'a> {
+/// The feasible regions of all features at x: pairs there become active.
+pub(super) struct FeasibleRegions<'a> {
     pub mesh: &'a CollisionMesh,
     pub x: &'a [Vector3<f64>],
 }
 
-impl Meeting<'_> {
-    /// Whether a pair with these closest points becomes a contact.
-    pub fn may_join(&self, pair: &Pair, closest: &Closest) -> bool {
+impl FeasibleRegions<'_> {
+    /// Whether a pair with these closest points is in a feasible region.
+    pub fn contain(&self, pair: &Pair, closest: &Closest) -> bool {
         match pair.kind {
             PairKind::PointTriangle => self.is_feasible_on_triangle(pair, closest),
-            PairKind::EdgeEdge if self.has_rail(pair) => self.meets_rail(pair, closest),
-            PairKind::EdgeEdge => self.edges_meet(pair, closest),
+            PairKind::EdgeEdge if self.has_rail(pair) => self.is_feasible_on_rail(pair, closest),
+            PairKind::EdgeEdge => self.are_edges_feasible(pair, closest),
         }
     }
 
@@ -58,7 +58,7 @@ impl Meeting<'_> {
         }
     }
 
-    fn edges_meet(&self, pair: &Pair, closest: &Closest) -> bool {
+    fn are_edges_feasible(&self, pair: &Pair, closest: &Closest) -> bool {
         let [first, second] = pair.features;
         let [a, b, c, d] = pair.vertices;
         let towards = closest.normal;
@@ -94,8 +94,8 @@ impl Meeting<'_> {
         self.mesh.obstacle_of(pair).is_some() && self.is_strand(pair.features[1])
     }
 
-    /// Whether an edge of cloth or hair meets a rail. Vertices of cloth do so, too.
-    fn meets_rail(&self, pair: &Pair, closest: &Closest) -> bool {
+    /// Whether an edge of cloth or hair acts on a rail. Vertices of cloth do so, too.
+    fn is_feasible_on_rail(&self, pair: &Pair, closest: &Closest) -> bool {
         self.is_strand(pair.features[0]) || are_inside(closest)
     }
 
@@ -159,9 +159,9 @@ fn across(x: &[Vector3<f64>], [a, b]: [u32; 2], apex: u32) -> Vector3<f64> {
 mod tests {
     use super::*;
 
-    /// Whether the middle edges of two pairs of triangles become a contact. The edge above crosses the one below, which
+    /// Whether the middle edges of two pairs of triangles are feasible. The edge above crosses the one below, which
     /// is along x, at an angle. The outer corners above fall by a height, those below rise by one.
-    fn edges_join(angle: f64, falls: f64, rises: f64) -> bool {
+    fn are_feasible(angle: f64, falls: f64, rises: f64) -> bool {
         let mesh = CollisionMesh::new(8, &[[0, 1, 2], [1, 0, 3], [4, 5, 6], [5, 4, 7]], &[], &[]);
         let ([c, s], up) = ([angle.cos(), angle.sin()], 0.002);
         let above = [[c, s, 0.0], [-c, -s, 0.0], [-s, c, -falls], [s, -c, -falls]].map(|[x, y, z]| [x, y, z + up]);
@@ -170,44 +170,44 @@ mod tests {
         let edge = |ends: [u32; 2]| (0..).zip(mesh.edges()).find(|(_, other)| **other == ends).map(|(edge, _)| edge);
         let features = [edge([0, 1]).unwrap(), edge([4, 5]).unwrap()];
         let pair = Pair { kind: PairKind::EdgeEdge, features, vertices: [0, 1, 4, 5] };
-        Meeting { mesh: &mesh, x: &x }.may_join(&pair, &Closest::of(&pair, &pair.corners(&x)))
+        FeasibleRegions { mesh: &mesh, x: &x }.contain(&pair, &Closest::of(&pair, &pair.corners(&x)))
     }
 
     #[test]
-    fn corners_of_hair_join_once() {
+    fn corners_of_hair_are_feasible_once() {
         // A strand with a kink at vertex 1 above a straight one, which ends at vertex 5.
         let mesh = CollisionMesh::new(6, &[], &[[0, 1], [1, 2], [3, 4], [4, 5]], &[]);
-        let joined = |kinked: [Vector3<f64>; 3], straight: [Vector3<f64>; 3]| {
+        let feasible = |kinked: [Vector3<f64>; 3], straight: [Vector3<f64>; 3]| {
             let x = [kinked, straight].concat();
-            let meeting = Meeting { mesh: &mesh, x: &x };
+            let regions = FeasibleRegions { mesh: &mesh, x: &x };
             let edges = mesh.edges();
             let pairs = (0..2).flat_map(|one| (2..4).map(move |other| [one, other]));
             let pairs = pairs.map(|features: [usize; 2]| {
                 let [[a, b], [c, d]] = features.map(|edge| edges[edge]);
                 Pair { kind: PairKind::EdgeEdge, features: features.map(|one| one as u32), vertices: [a, b, c, d] }
             });
-            let joins = |pair: &Pair| meeting.may_join(pair, &Closest::of(pair, &pair.corners(&x)));
-            pairs.filter(joins).map(|pair| pair.features).collect::<Vec<_>>()
+            let is_feasible = |pair: &Pair| regions.contain(pair, &Closest::of(pair, &pair.corners(&x)));
+            pairs.filter(is_feasible).map(|pair| pair.features).collect::<Vec<_>>()
         };
         let straight = [[-1.0, 0.0, 0.0], [0.25, 0.0, 0.0], [1.0, 0.0, 0.0]];
         let hangs = [[0.5, -0.5, 1.0], [0.5, 0.0, 0.1], [0.5, 0.5, 1.0]];
-        assert_eq!(joined(hangs, straight), [[0, 3]], "a kink above the inside");
+        assert_eq!(feasible(hangs, straight), [[0, 3]], "a kink above the inside");
         let over_corner = hangs.map(|[x, y, z]| [x - 0.25, y, z]);
-        assert_eq!(joined(over_corner, straight), [[0, 2]], "a kink above a corner");
+        assert_eq!(feasible(over_corner, straight), [[0, 2]], "a kink above a corner");
         let stands = hangs.map(|[x, y, z]| [x, y, 0.2 - z]);
-        assert_eq!(joined(stands, straight), [[0, 3], [1, 3]], "the insides of both segments come nearer");
+        assert_eq!(feasible(stands, straight), [[0, 3], [1, 3]], "the insides of both segments come nearer");
         let crosses = [[0.5, -0.5, 0.1], [0.5, 0.5, 0.1], [0.5, 0.9, 0.1]];
-        assert_eq!(joined(crosses, straight), [[0, 3]], "insides");
+        assert_eq!(feasible(crosses, straight), [[0, 3]], "insides");
         let parallel = straight.map(|[x, y, z]| [0.7 * x + 0.05, y + 0.1, z]);
-        assert!(!joined(parallel, straight).is_empty(), "side by side");
+        assert!(!feasible(parallel, straight).is_empty(), "side by side");
     }
 
     #[test]
-    fn edges_join_unless_one_is_a_valley_or_they_are_parallel() {
+    fn edges_are_feasible_unless_one_is_a_valley_or_they_are_parallel() {
         // Flat layers, ridges, and gentle valleys.
-        assert!(edges_join(1.5, 0.0, 0.0) && edges_join(0.2, 0.0, 0.0));
-        assert!(edges_join(1.5, -0.5, -0.5) && edges_join(1.5, 0.25, 0.25));
-        assert!(!edges_join(1.5, 0.4, 0.0) && !edges_join(1.5, 0.0, 0.4));
-        assert!(!edges_join(0.05, 0.0, 0.0));
+        assert!(are_feasible(1.5, 0.0, 0.0) && are_feasible(0.2, 0.0, 0.0));
+        assert!(are_feasible(1.5, -0.5, -0.5) && are_feasible(1.5, 0.25, 0.25));
+        assert!(!are_feasible(1.5, 0.4, 0.0) && !are_feasible(1.5, 0.0, 0.4));
+        assert!(!are_feasible(0.05, 0.0, 0.0));
     }
 }

@@ -1,9 +1,9 @@
 //! Friction of cloth with itself and with obstacles.
 //!
-//! A pair in contact has the potential μ λ (√(‖t‖² + ε²) − ε) ([`SlidingFriction`]) of the way t that it has slid
-//! from where it sticks. This way is a bristle: it bends by up to a tenth of a millimetre, then the pair slips and the
-//! bristle follows. A bristle at rest stays at rest, so a pair that sticks does not creep. With ε a tenth of the length
-//! of a bristle, a pair that slips has 0.995 of the friction μ λ.
+//! A pair in contact has the potential μ λ (√(‖t‖² + ε²) − ε) ([`SlidingFriction`]) of the tangential displacement t
+//! from where it sticks. The displacement is a bristle: it bends by up to a tenth of a millimetre, then the pair slips
+//! and the bristle follows. A bristle at rest stays at rest, so a pair that sticks does not creep. With ε a tenth of
+//! the length of a bristle, a pair that slips has 0.995 of the friction μ λ.
 //!
 //! Closest points, normal and normal force λ are lagged: taken at the start of the step, so that friction has a
 //! potential (Li et al. 2020, "Incremental potential contact", §5.5).
@@ -24,26 +24,26 @@ use crate::geometry::{add_scaled, dot, subtract};
 /// The deflection ε of a bristle at which friction is μ/√2 times the normal force, in m.
 const SOFTNESS: f64 = 0.1 * LENGTH;
 /// Why an evaluation cannot fail.
-const ONE_WAY: &str = "each pair has one way";
+const ONE_DISPLACEMENT: &str = "each pair has one displacement";
 
 /// The friction of a step.
 #[derive(Debug, Default)]
 pub(super) struct Friction {
     /// μ at each vertex of cloth and hair; empty without friction between them.
     pub coefficients: Vec<f64>,
-    /// The grip of each obstacle.
-    pub grips: Vec<Grip>,
+    /// The friction of each obstacle.
+    pub obstacles: Vec<ObstacleFriction>,
     /// Positions at the start of the step.
     pub start: Vec<Vector3<f64>>,
     /// The deflections at the start.
     bristles: Bristles,
-    /// The pairs in contact at the start; `None` before they are known.
-    sliding: Option<Slidings>,
+    /// The pairs in contact at the start; `None` before friction is lagged.
+    lagged: Option<LaggedPairs>,
 }
 
 /// The friction of an obstacle.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Grip {
+pub struct ObstacleFriction {
     /// The coefficient of friction.
     pub coefficient: f64,
     /// The first of four vertices that move with the obstacle: an origin, and the ends of three orthogonal unit
@@ -55,22 +55,22 @@ pub struct Grip {
 
 /// All pairs in contact at the start of the step, in order.
 #[derive(Debug)]
-struct Slidings {
-    pairs: Vec<Sliding>,
-    /// The potentials, in parts. Element i of a part acts on the vector between the sliding points of its pair i.
+struct LaggedPairs {
+    pairs: Vec<LaggedPair>,
+    /// The potentials, in parts. Element i of a part acts on the vector between the lagged points of its pair i.
     elements: Vec<Packed<SlidingFriction>>,
 }
 
 /// A pair in contact at the start of the step.
 #[derive(Debug)]
-struct Sliding {
+struct LaggedPair {
     pair: Pair,
     /// The coefficients of the closest points at the start, without those of a rigid obstacle.
     weights: [f64; 4],
     /// The point of a moving obstacle that slides.
     anchor: Option<Anchor>,
     normal: Vector3<f64>,
-    /// The vector between the sliding points while the bristle is straight, up to a multiple of the normal.
+    /// The vector between the lagged points while the bristle is straight, up to a multiple of the normal.
     straight: Vector3<f64>,
 }
 
@@ -79,7 +79,7 @@ struct Sliding {
 struct Anchor {
     /// The first vertex of the obstacle's frame.
     frame: u32,
-    /// The coefficients of the frame's vertices in the sliding. Their sum is 1 or −1.
+    /// The coefficients of the frame's vertices in the displacement. Their sum is 1 or −1.
     weights: [f64; 4],
 }
 
@@ -88,20 +88,20 @@ impl Friction {
     /// bristles are as before.
     pub fn begin_step(&mut self, x: &[Vector3<f64>]) {
         self.bristles = self.bristles_at(x);
-        self.sliding = None;
-        if self.is_rough() {
+        self.lagged = None;
+        if self.has_friction() {
             x.clone_into(&mut self.start);
         }
     }
 
     /// Returns the bristles at the end of a step.
     fn bristles_at(&self, x: &[Vector3<f64>]) -> Bristles {
-        let Some(sliding) = &self.sliding else { return self.bristles.clone() };
-        let way = |one: &Sliding| {
-            let way = subtract(one.between(x), one.straight);
-            (one.pair, one.normal, add_scaled(way, -dot(way, one.normal), one.normal))
+        let Some(lagged) = &self.lagged else { return self.bristles.clone() };
+        let tangential = |one: &LaggedPair| {
+            let displacement = subtract(one.between(x), one.straight);
+            (one.pair, one.normal, add_scaled(displacement, -dot(displacement, one.normal), one.normal))
         };
-        Bristles::new(sliding.pairs.iter().map(way))
+        Bristles::new(lagged.pairs.iter().map(tangential))
     }
 
     /// Returns the bristles at x, where the last step ended, for a checkpoint.
@@ -111,59 +111,59 @@ impl Friction {
 
     /// Restores the bristles of a checkpoint.
     pub fn restore(&mut self, memory: ContactMemory) {
-        (self.bristles, self.sliding) = (Bristles::restored(memory), None);
+        (self.bristles, self.lagged) = (Bristles::restored(memory), None);
     }
 
     /// Creates the friction of bodies and obstacles that have none.
-    pub fn without_grip(obstacles: usize) -> Self {
-        Self { grips: vec![Grip::default(); obstacles], ..Self::default() }
+    pub fn frictionless(obstacles: usize) -> Self {
+        Self { obstacles: vec![ObstacleFriction::default(); obstacles], ..Self::default() }
     }
 
     /// Whether anything has friction.
-    pub fn is_rough(&self) -> bool {
-        !self.coefficients.is_empty() || self.grips.iter().any(|grip| grip.coefficient > 0.0)
+    pub fn has_friction(&self) -> bool {
+        !self.coefficients.is_empty() || self.obstacles.iter().any(|obstacle| obstacle.coefficient > 0.0)
     }
 
     /// The coefficient of friction of a pair.
     fn coefficient(&self, mesh: &CollisionMesh, pair: &Pair) -> f64 {
         if let Some(obstacle) = mesh.obstacle_of(pair) {
-            return self.grips[obstacle].coefficient;
+            return self.obstacles[obstacle].coefficient;
         }
         let of = |vertex: u32| self.coefficients.get(vertex as usize).copied().unwrap_or(0.0);
         0.5 * (of(pair.vertices[0]) + of(pair.vertices[pair.first()]))
     }
 
-    /// Takes the pairs in contact at the start, in order, with their laws and closest points.
-    pub fn take(&mut self, mesh: &CollisionMesh, touching: &[(Pair, Law, Closest)], threads: usize) {
+    /// Lags friction: takes the pairs in contact at the start, in order, with their laws and closest points.
+    pub fn lag(&mut self, mesh: &CollisionMesh, in_contact: &[(Pair, Law, Closest)], threads: usize) {
         let of = |(pair, law, closest): &(Pair, Law, Closest)| {
             let limit = self.coefficient(mesh, pair) * law.force(law.apart(closest));
             if limit <= 0.0 {
                 return None;
             }
-            let (weights, anchor) = self.sliding_point(mesh, pair, closest);
+            let (weights, anchor) = self.lagged_point(mesh, pair, closest);
             let normal = closest.normal;
-            let between = sliding(pair, &weights, anchor, &self.start);
+            let between = displacement(pair, &weights, anchor, &self.start);
             let is_on_obstacle = mesh.obstacle_of(pair).is_some();
             let straight = subtract(between, self.bristles.deflection(pair, normal, is_on_obstacle));
             let element = SlidingFriction::new(normal, straight, limit, SOFTNESS);
-            Some((Sliding { pair: *pair, weights, anchor, normal, straight }, element))
+            Some((LaggedPair { pair: *pair, weights, anchor, normal, straight }, element))
         };
         let part = |part: &[(Pair, Law, Closest)]| part.iter().filter_map(of).collect::<Vec<_>>();
-        let parts = for_each(threads, touching.chunks(PART).collect(), part);
+        let parts = for_each(threads, in_contact.chunks(PART).collect(), part);
         let (pairs, elements): (Vec<_>, Vec<_>) = parts.into_iter().flatten().unzip();
         let stencils: Vec<[u32; 1]> = (0..).map(|number| [number]).take(PART).collect();
         let packed = |part: &[SlidingFriction]| Packed::new(part, &stencils[..part.len()]);
-        self.sliding = Some(Slidings { pairs, elements: elements.chunks(PART).map(packed).collect() });
+        self.lagged = Some(LaggedPairs { pairs, elements: elements.chunks(PART).map(packed).collect() });
     }
 
     /// Returns the coefficients of the closest points on cloth and hair, and the closest point of an obstacle.
-    fn sliding_point(&self, mesh: &CollisionMesh, pair: &Pair, closest: &Closest) -> ([f64; 4], Option<Anchor>) {
-        let Some(obstacle) = mesh.obstacle_of(pair).filter(|obstacle| !self.grips[*obstacle].deforms) else {
+    fn lagged_point(&self, mesh: &CollisionMesh, pair: &Pair, closest: &Closest) -> ([f64; 4], Option<Anchor>) {
+        let Some(obstacle) = mesh.obstacle_of(pair).filter(|obstacle| !self.obstacles[*obstacle].deforms) else {
             return (closest.weights, None);
         };
         let is_own = pair.vertices.map(|vertex| mesh.obstacle(vertex).is_none());
         let weights = std::array::from_fn(|corner| if is_own[corner] { closest.weights[corner] } else { 0.0 });
-        let anchor = self.grips[obstacle].frame.map(|frame| {
+        let anchor = self.obstacles[obstacle].frame.map(|frame| {
             let at = pair.corners(&self.start);
             let own = (0..4).fold([0.0; 3], |sum, corner| add_scaled(sum, weights[corner], at[corner]));
             // With the cloth first, its closest point is the sum; otherwise minus the sum.
@@ -185,9 +185,9 @@ impl Friction {
 
     /// Adds the forces of friction, in N.
     pub fn add_force(&self, x: &[Vector3<f64>], threads: usize, force: &mut [Vector3<f64>]) {
-        let slopes = for_each(threads, self.parts().collect(), |part| part.slopes(x));
-        for (one, slope) in self.pairs().iter().zip(slopes.iter().flatten()) {
-            let drag = slope.map(|component| -component);
+        let gradients = for_each(threads, self.parts().collect(), |part| part.gradients(x));
+        for (one, gradient) in self.pairs().iter().zip(gradients.iter().flatten()) {
+            let drag = gradient.map(|component| -component);
             one.pair.add(one.weights, drag, force);
             for (vertex, weight) in one.anchor.iter().flat_map(Anchor::terms) {
                 force[vertex] = add_scaled(force[vertex], weight, drag);
@@ -196,96 +196,86 @@ impl Friction {
     }
 
     /// Returns the stiffness of friction.
-    pub fn stiffness(&self, x: &[Vector3<f64>], threads: usize) -> Stiffness<'_> {
+    pub fn stiffness(&self, x: &[Vector3<f64>], threads: usize) -> FrictionStiffness<'_> {
         let blocks = for_each(threads, self.parts().collect(), |part| part.blocks(x));
-        Stiffness { pairs: self.pairs(), blocks: blocks.concat() }
+        FrictionStiffness { pairs: self.pairs(), blocks: blocks.concat() }
     }
 
-    fn pairs(&self) -> &[Sliding] {
-        self.sliding.as_ref().map_or(&[], |sliding| &sliding.pairs)
+    fn pairs(&self) -> &[LaggedPair] {
+        self.lagged.as_ref().map_or(&[], |lagged| &lagged.pairs)
     }
 
     /// The pairs in parts, each with its potentials.
     fn parts(&self) -> impl Iterator<Item = Part<'_>> {
-        let elements = self.sliding.iter().flat_map(|sliding| &sliding.elements);
+        let elements = self.lagged.iter().flat_map(|lagged| &lagged.elements);
         self.pairs().chunks(PART).zip(elements).map(|(pairs, elements)| Part { pairs, elements })
     }
 }
 
-/// The stiffness of friction at one place.
-pub(super) struct Stiffness<'a> {
-    pairs: &'a [Sliding],
+/// The stiffness of friction at one state.
+pub(super) struct FrictionStiffness<'a> {
+    pairs: &'a [LaggedPair],
     /// The Hessian of each pair's energy, in N/m.
     blocks: Vec<Block<f64>>,
 }
 
-/// The stiffness of the friction of one pair.
-#[derive(Clone, Copy)]
-pub(super) struct Rubbing<'a> {
-    weights: &'a [f64; 4],
-    block: &'a Block<f64>,
-}
-
-impl Stiffness<'_> {
-    /// The pairs from one pair up to another, in order. `None` stands for no bound.
-    pub fn between(&self, first: Option<&Pair>, end: Option<&Pair>) -> impl Iterator<Item = (&Pair, Rubbing<'_>)> {
-        let place = |pair: &Pair| self.pairs.partition_point(|one| one.pair < *pair);
-        let range = first.map_or(0, place)..end.map_or(self.pairs.len(), place);
+impl FrictionStiffness<'_> {
+    /// The pairs from one pair up to another, in order, each as a contact without rows. `None` stands for no bound.
+    pub fn between(&self, first: Option<&Pair>, end: Option<&Pair>) -> impl Iterator<Item = (&Pair, Contact)> {
+        let position = |pair: &Pair| self.pairs.partition_point(|one| one.pair < *pair);
+        let range = first.map_or(0, position)..end.map_or(self.pairs.len(), position);
         let pairs = self.pairs[range.clone()].iter().zip(&self.blocks[range]);
-        pairs.map(|(one, block)| (&one.pair, Rubbing { weights: &one.weights, block }))
-    }
-}
-
-impl Rubbing<'_> {
-    /// The contact of vertices with these rows.
-    pub fn contact(self, rows: [u32; 4]) -> Contact {
-        Contact { rows, weights: *self.weights, block: *self.block }
+        pairs.map(|(one, &block)| (&one.pair, Contact { rows: [Contact::FIXED; 4], weights: one.weights, block }))
     }
 }
 
 /// Some pairs in contact at the start of the step, with their potentials.
 struct Part<'a> {
-    pairs: &'a [Sliding],
+    pairs: &'a [LaggedPair],
     elements: &'a Packed<SlidingFriction>,
 }
 
 impl Part<'_> {
-    /// The vector between the sliding points of each pair.
-    fn ways(&self, x: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
+    /// The vector between the lagged points of each pair.
+    fn displacements(&self, x: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
         self.pairs.iter().map(|one| one.between(x)).collect()
     }
 
     /// The energy of each pair, in J.
     fn energies(&self, x: &[Vector3<f64>]) -> Vec<f64> {
-        let ways = self.ways(x);
-        let mut energies = vec![0.0; ways.len()];
-        self.elements.values(0..ways.len(), &ways, &mut energies).expect(ONE_WAY);
+        let displacements = self.displacements(x);
+        let mut energies = vec![0.0; displacements.len()];
+        self.elements.values(0..displacements.len(), &displacements, &mut energies).expect(ONE_DISPLACEMENT);
         energies
     }
 
     /// The gradient of each pair's energy, in N.
-    fn slopes(&self, x: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
-        let ways = self.ways(x);
-        let (mut energies, mut slopes) = (vec![0.0; ways.len()], vec![[0.0; 3]; ways.len()]);
-        self.elements.gradients(0..ways.len(), &ways, &mut energies, slopes.as_flattened_mut()).expect(ONE_WAY);
-        slopes
+    fn gradients(&self, x: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
+        let displacements = self.displacements(x);
+        let (mut energies, mut gradients) = (vec![0.0; displacements.len()], vec![[0.0; 3]; displacements.len()]);
+        self.elements
+            .gradients(0..displacements.len(), &displacements, &mut energies, gradients.as_flattened_mut())
+            .expect(ONE_DISPLACEMENT);
+        gradients
     }
 
     /// The Hessian of each pair's energy, in N/m.
     fn blocks(&self, x: &[Vector3<f64>]) -> Vec<Block<f64>> {
-        let ways = self.ways(x);
-        let (mut energies, mut slopes) = (vec![0.0; ways.len()], vec![0.0; 3 * ways.len()]);
-        let mut blocks = vec![[[0.0; 3]; 3]; ways.len()];
+        let displacements = self.displacements(x);
+        let (mut energies, mut gradients) = (vec![0.0; displacements.len()], vec![0.0; 3 * displacements.len()]);
+        let mut blocks = vec![[[0.0; 3]; 3]; displacements.len()];
         let numbers = blocks.as_flattened_mut().as_flattened_mut();
-        self.elements.hessians(0..ways.len(), &ways, &mut energies, &mut slopes, numbers).expect(ONE_WAY);
+        self.elements
+            .hessians(0..displacements.len(), &displacements, &mut energies, &mut gradients, numbers)
+            .expect(ONE_DISPLACEMENT);
         blocks
     }
 }
 
-impl Sliding {
+impl LaggedPair {
     /// The vector between the points that were closest at the start.
     fn between(&self, x: &[Vector3<f64>]) -> Vector3<f64> {
-        sliding(&self.pair, &self.weights, self.anchor, x)
+        displacement(&self.pair, &self.weights, self.anchor, x)
     }
 }
 
@@ -296,8 +286,8 @@ impl Anchor {
     }
 }
 
-/// The vector between the points that slide, up to a constant: Σ cᵢ xᵢ. Differences to one corner lose fewer digits.
-fn sliding(pair: &Pair, weights: &[f64; 4], anchor: Option<Anchor>, x: &[Vector3<f64>]) -> Vector3<f64> {
+/// The displacement between the lagged points, up to a constant: Σ cᵢ xᵢ. Differences to one corner lose fewer digits.
+fn displacement(pair: &Pair, weights: &[f64; 4], anchor: Option<Anchor>, x: &[Vector3<f64>]) -> Vector3<f64> {
     let corners = pair.corners(x);
     // On a fixed obstacle the coefficients do not add up to 0.
     let is_balanced = weights.iter().sum::<f64>().abs() < 0.5;
@@ -344,12 +334,12 @@ mod tests {
     }
 
     #[test]
-    fn a_way_along_the_normal_bends_no_bristle() {
+    fn a_displacement_along_the_normal_bends_no_bristle() {
         let (weights, straight) = ([1.0, -0.5, -0.3, -0.2], [0.0; 3]);
         let pair = pair([0, 3, 4, 5]);
-        let one = Sliding { pair, weights, anchor: None, normal: UP, straight };
+        let one = LaggedPair { pair, weights, anchor: None, normal: UP, straight };
         let friction =
-            Friction { sliding: Some(Slidings { pairs: vec![one], elements: Vec::new() }), ..Friction::default() };
+            Friction { lagged: Some(LaggedPairs { pairs: vec![one], elements: Vec::new() }), ..Friction::default() };
         // Ten lengths of a bristle along the normal, and less than one across.
         let mut x = [[0.0; 3]; 6];
         x[0] = [3e-5, -4e-5, 10.0 * LENGTH];
@@ -358,20 +348,20 @@ mod tests {
         assert!(error < 1e-12 * LENGTH, "{deflection:?}");
     }
 
-    /// Returns the pair's sliding on an obstacle that moves, and the closest points on cloth and obstacle.
-    fn on_obstacle(cloth_is_first: bool) -> (Sliding, [Vector3<f64>; 2]) {
+    /// Returns a pair on an obstacle that moves, and the closest points on cloth and obstacle.
+    fn on_obstacle(cloth_is_first: bool) -> (LaggedPair, [Vector3<f64>; 2]) {
         let core = Core { vertices: POSITIONS[3..6].to_vec(), triangles: vec![[0, 1, 2]], ..Core::default() };
         let mesh = CollisionMesh::new(3, &[[0, 1, 2]], &[], &[]).with_obstacles(&[core]);
-        let grips = vec![Grip { coefficient: 0.5, frame: Some(6), deforms: false }];
-        let friction = Friction { grips, start: POSITIONS.to_vec(), ..Friction::default() };
+        let obstacles = vec![ObstacleFriction { coefficient: 0.5, frame: Some(6), deforms: false }];
+        let friction = Friction { obstacles, start: POSITIONS.to_vec(), ..Friction::default() };
         let pair = pair(if cloth_is_first { [0, 3, 4, 5] } else { [4, 0, 1, 2] });
         let closest = Closest::of(&pair, &pair.corners(&POSITIONS));
-        let (weights, anchor) = friction.sliding_point(&mesh, &pair, &closest);
+        let (weights, anchor) = friction.lagged_point(&mesh, &pair, &closest);
         let own = |corner: usize| if pair.vertices[corner] < 3 { closest.weights[corner].abs() } else { 0.0 };
         let at = pair.corners(&POSITIONS);
         let point = (0..4).fold([0.0; 3], |sum, corner| add_scaled(sum, own(corner), at[corner]));
-        let sliding = Sliding { pair, weights, anchor, normal: closest.normal, straight: [0.0; 3] };
-        (sliding, [point, point])
+        let lagged = LaggedPair { pair, weights, anchor, normal: closest.normal, straight: [0.0; 3] };
+        (lagged, [point, point])
     }
 
     #[test]

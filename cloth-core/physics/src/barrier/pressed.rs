@@ -1,4 +1,4 @@
-//! The place where contact presses the most, for messages.
+//! The feature that contact presses the most, for messages.
 
 use energy_dsl::Vector3;
 use energy_solve::{Pressed, Presser};
@@ -22,7 +22,7 @@ struct Push<'a> {
 }
 
 impl Push<'_> {
-    /// Whether it acts on the same place as another push, from the opposite side.
+    /// Whether it acts on the same feature as another push, from the opposite side.
     fn opposes(&self, other: &Self) -> bool {
         self.on.iter().any(|vertex| other.on.contains(vertex)) && dot(self.direction, other.direction) < OPPOSITE
     }
@@ -31,7 +31,7 @@ impl Push<'_> {
 impl BarrierContact {
     /// Returns the feature with the largest push at x, what pushes it, and what pushes against that.
     pub(super) fn find_most_pressed(&self, x: &[Vector3<f64>]) -> Option<Pressed> {
-        let active = self.joined.evaluate(x, Order::Force, 1, |active| {
+        let active = self.active.evaluate(x, Order::Force, 1, |active| {
             let push = |(pair, closest, barrier): (&Pair, _, &_)| (*pair, closest, *barrier);
             active.iter().map(push).collect::<Vec<_>>()
         });

@@ -1,6 +1,6 @@
 //! Thickness and activation gap of each pair.
 
-use super::JOINING;
+use super::ACTIVATION;
 use crate::collision::{Clearance, CollisionMesh, Pair};
 
 /// The activation gap over the thickness of cloth.
@@ -78,18 +78,18 @@ impl Spacings {
         self.skins.iter().map(Skin::reach).fold(2.0 * thickest + self.gap, f64::max)
     }
 
-    /// The distance within which a pair joins, in m: beyond the reach by a part of it.
+    /// The distance within which a pair becomes active, in m: beyond the reach by a part of it.
     #[inline]
-    pub fn joining(&self, mesh: &CollisionMesh, pair: &Pair) -> f64 {
+    pub fn activation(&self, mesh: &CollisionMesh, pair: &Pair) -> f64 {
         let Spacing { thickness, gap } = self.of(mesh, pair);
         let solid = mesh.obstacle_of(pair).map_or(0.0, |obstacle| self.skins[obstacle].radius);
-        solid + JOINING * (thickness + gap - solid)
+        solid + ACTIVATION * (thickness + gap - solid)
     }
 
     /// Returns half the distance within which pairs are searched for, at each vertex.
     pub fn halves(&self, mesh: &CollisionMesh) -> Vec<f64> {
-        let own = 0.5 * JOINING * (self.gap + 2.0 * self.radii.iter().copied().fold(0.0, f64::max));
-        let skin = |skin: &Skin| (skin.radius + JOINING * (skin.reach() - skin.radius) - own).max(0.0);
+        let own = 0.5 * ACTIVATION * (self.gap + 2.0 * self.radii.iter().copied().fold(0.0, f64::max));
+        let skin = |skin: &Skin| (skin.radius + ACTIVATION * (skin.reach() - skin.radius) - own).max(0.0);
         let half = |vertex: u32| mesh.obstacle(vertex).map_or(own, |obstacle| skin(&self.skins[obstacle]));
         (0..energy_solve::index(mesh.vertices())).map(half).collect()
     }

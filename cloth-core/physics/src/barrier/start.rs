@@ -6,10 +6,10 @@ use std::ops::Range;
 use energy_dsl::Vector3;
 use energy_solve::ContactCounts;
 
-use super::feasible::Meeting;
+use super::feasible::FeasibleRegions;
 use super::law::Law;
 use super::spacing::{Skin, Spacings};
-use super::{BarrierContact, Friction, Joined, Resistance};
+use super::{ActiveSet, BarrierContact, Friction};
 use crate::collision::{
     Closest, CollisionMesh, Crossing, Exclusions, MovingBalls, Neighbourhood, Pair, Rules, Search, crossings,
 };
@@ -25,6 +25,7 @@ pub(super) const TOUCHING: f64 = 1e-6;
 
 /// A start that contact cannot keep free of crossings, because it is not.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum ContactError {
     /// Edges cross triangles.
     #[error(
@@ -212,10 +213,9 @@ impl BarrierContact {
             least_limit: EDGES * mesh.mean_edge(x),
             search,
             neighbourhood: Neighbourhood::default(),
-            joined: Joined::default(),
-            friction: Friction::without_grip(obstacles.len()),
+            active: ActiveSet::default(),
+            friction: Friction::frictionless(obstacles.len()),
             blocking: Vec::new(),
-            resistance: Resistance::default(),
             counts: ContactCounts::default(),
             mesh,
         };
@@ -226,9 +226,9 @@ impl BarrierContact {
 
     /// Gives obstacles their skins, so thin that nothing starts within them.
     fn fit_skins(&mut self, obstacles: &[ObstacleStart], x: &[Vector3<f64>]) -> Result<(), ContactError> {
-        self.visit(x);
+        self.refit(x);
         let mut nearest: Vec<Option<(f64, Pair)>> = vec![None; obstacles.len()];
-        for (pair, closest) in self.neighbourhood.nearby().within_reach() {
+        for (pair, closest) in self.neighbourhood.candidates().within_reach() {
             let Some(obstacle) = self.mesh.obstacle_of(pair) else { continue };
             let distance = closest.distance - obstacles[obstacle].radius;
             if nearest[obstacle].is_none_or(|(known, _)| distance < known) {
@@ -252,10 +252,10 @@ impl BarrierContact {
     /// Returns the fastest push that contact gives to vertices right after the start at x, in steps of `dt`; `None` if
     /// nothing starts within reach.
     pub fn first_push(&mut self, x: &[Vector3<f64>], dt: f64) -> Option<FirstPush> {
-        self.visit(x);
-        let meeting = Meeting { mesh: &self.mesh, x };
-        let joined =
-            self.neighbourhood.nearby().within_reach().filter(|(pair, closest)| meeting.may_join(pair, closest));
+        self.refit(x);
+        let regions = FeasibleRegions { mesh: &self.mesh, x };
+        let feasible =
+            self.neighbourhood.candidates().within_reach().filter(|(pair, closest)| regions.contain(pair, closest));
         let push = |(pair, closest): (&Pair, &Closest)| {
             let obstacle = self.mesh.obstacle_of(pair);
             let radius = obstacle.map_or(0.0, |obstacle| self.spacings.skins[obstacle].radius);
@@ -267,12 +267,12 @@ impl BarrierContact {
             let reach = spacing.thickness + spacing.gap - radius;
             FirstPush { by, distance: closest.distance - radius, reach, speed }
         };
-        joined.map(push).filter(|push| push.speed > 0.0).max_by(|one, other| one.speed.total_cmp(&other.speed))
+        feasible.map(push).filter(|push| push.speed > 0.0).max_by(|one, other| one.speed.total_cmp(&other.speed))
     }
 
     fn check_distances(&mut self, x: &[Vector3<f64>]) -> Result<(), ContactError> {
-        self.visit(x);
-        let all = self.neighbourhood.nearby().within_reach();
+        self.refit(x);
+        let all = self.neighbourhood.candidates().within_reach();
         let all = all.map(|(pair, closest)| (closest.distance, self.spacing(pair).thickness, pair));
         let close: Vec<_> = all.filter(|(distance, thickness, _)| distance <= thickness).collect();
         let closest = close.iter().min_by(|a, b| a.0.total_cmp(&b.0));

@@ -1,16 +1,16 @@
 use energy_dsl::Vector3;
 use energy_solve::Contact;
 
-use super::friction::Stiffness;
-use super::joined::Active;
+use super::active_set::ActivePart;
+use super::friction::FrictionStiffness;
 use super::rolling::rolling;
 use crate::collision::{Closest, CollisionMesh, Pair};
 
 /// Returns the stiffness of some pairs: of their barriers, on obstacles against rolling, and of friction. Those of a
 /// pair follow each other. `rows` gives the rows of a pair's vertices in the matrix.
 pub(super) fn contacts(
-    active: &Active<'_>,
-    friction: &Stiffness<'_>,
+    active: &ActivePart<'_>,
+    friction: &FrictionStiffness<'_>,
     mesh: &CollisionMesh,
     rows: impl Fn(&Pair) -> [u32; 4],
     x: &[Vector3<f64>],
@@ -19,8 +19,8 @@ pub(super) fn contacts(
     // Friction also acts on pairs that have parted since the start of the step.
     let mut friction = friction.between(active.first, active.end).peekable();
     for (pair, closest, barrier) in active.iter() {
-        while let Some((pair, rubbing)) = friction.next_if(|(other, _)| *other < pair) {
-            contacts.push(rubbing.contact(rows(pair)));
+        while let Some((pair, one)) = friction.next_if(|(other, _)| *other < pair) {
+            contacts.push(Contact { rows: rows(pair), ..one });
         }
         let rows = rows(pair);
         contacts.push(along_normal(rows, closest.weights, &closest, barrier.curvature));
@@ -31,7 +31,7 @@ pub(super) fn contacts(
             contacts.extend(tilts.map(|weights| along_normal(rows, weights, &closest, stiffness)));
         }
     }
-    contacts.extend(friction.map(|(pair, rubbing)| rubbing.contact(rows(pair))));
+    contacts.extend(friction.map(|(pair, one)| Contact { rows: rows(pair), ..one }));
     contacts
 }
 

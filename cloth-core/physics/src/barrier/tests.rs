@@ -1,8 +1,9 @@
 use energy_dsl::{Potential, Vector3};
 use energy_elements::{Distance, EdgeEdgeDistance, PointEdgeDistance, PointTriangleDistance};
-use energy_solve::{ContactModel, DofMap, Pressed, Presser};
+use energy_solve::{Contact, DofMap, Pressed, Presser, Resistance};
 use proptest::prelude::*;
 
+use super::law::Law;
 use super::*;
 use crate::collision::PairKind;
 use crate::geometry::{add_scaled, cross, dot, norm, subtract};
@@ -15,15 +16,29 @@ fn contact(x: &[Vector3<f64>]) -> BarrierContact {
     let mesh = CollisionMesh::new(6, &[[0, 1, 2], [3, 4, 5]], &[], &[]);
     let mut contact = BarrierContact::new(mesh, x, vec![true; 6], vec![0.5 * THICKNESS; 6], GAP).unwrap();
     contact.begin_step(x);
-    let block = [[50.0, 0.0, 0.0], [0.0, 50.0, 0.0], [0.0, 0.0, 50.0]];
-    contact.set_resistance(&DofMap::new(&[false; 6]), vec![block; 6], vec![1.0; 6]);
     contact
+}
+
+/// The step that has begun.
+fn step(contact: &mut BarrierContact) -> BarrierStep<'_> {
+    BarrierStep { contact }
+}
+
+/// The resistance of free vertices.
+fn resistance(vertices: usize) -> Resistance {
+    let block = [[50.0, 0.0, 0.0], [0.0, 50.0, 0.0], [0.0, 0.0, 50.0]];
+    Resistance::new(&DofMap::new(&vec![false; vertices]), vec![block; vertices], vec![1.0; vertices])
+}
+
+/// Updates the active set of a step.
+fn update(contact: &mut BarrierContact, x: &[Vector3<f64>]) -> f64 {
+    step(contact).update_active_set(x, &resistance(x.len()))
 }
 
 /// The pairs with an energy at x.
 fn active(contact: &BarrierContact, x: &[Vector3<f64>]) -> Vec<(Pair, Law, Closest)> {
-    let joined = contact.joined.pairs.iter().zip(&contact.joined.laws);
-    let all = joined.map(|(pair, law)| (*pair, *law, Closest::of(pair, &pair.corners(x))));
+    let active = contact.active.pairs.iter().zip(&contact.active.laws);
+    let all = active.map(|(pair, law)| (*pair, *law, Closest::of(pair, &pair.corners(x))));
     all.filter(|(_, law, closest)| law.is_active(closest.distance)).collect()
 }
 
@@ -43,9 +58,9 @@ fn states() -> Vec<Vec<Vector3<f64>>> {
 fn forces_are_minus_the_gradient_and_neither_push_nor_turn_the_whole() {
     for x in states() {
         let mut contact = contact(&x);
-        let joined = contact.meet(&x);
+        let added = update(&mut contact, &x);
         let energy = contact.energy(&x);
-        assert!(energy > 0.0 && energy.is_finite() && (energy - joined).abs() < 1e-15 * energy, "{energy} {joined}");
+        assert!(energy > 0.0 && energy.is_finite() && (energy - added).abs() < 1e-15 * energy, "{energy} {added}");
         let mut force = vec![[0.0; 3]; 6];
         contact.add_force(&x, &mut force);
         let largest = force.iter().map(|f| norm(*f)).fold(0.0, f64::max);
@@ -74,10 +89,8 @@ fn friction_opposes_sliding() {
     for x in states() {
         let force_at = |coefficient: f64, to: &[Vector3<f64>]| {
             let mut contact = contact(&x).with_friction(vec![coefficient; 6]);
-            contact.begin_step(&x);
-            let block = [[50.0, 0.0, 0.0], [0.0, 50.0, 0.0], [0.0, 0.0, 50.0]];
-            contact.set_resistance(&DofMap::new(&[false; 6]), vec![block; 6], vec![1.0; 6]);
-            contact.meet(&x);
+            contact.begin_step(&x).lag_friction(&resistance(6));
+            update(&mut contact, &x);
             let mut force = vec![[0.0; 3]; 6];
             contact.add_force(to, &mut force);
             (force, contact)
@@ -100,7 +113,7 @@ fn friction_opposes_sliding() {
         // The force is minus the gradient of the energy, and the stiffness its derivative.
         let stiffness = {
             let (_, mut contact) = force_at(FRICTION, &moved);
-            contact.contacts(&DofMap::new(&[false; 6]), &moved).concat()
+            step(&mut contact).stiffness(&DofMap::new(&[false; 6]), &moved).concat()
         };
         for (vertex, axis) in (3..6).flat_map(|vertex| (0..3).map(move |axis| (vertex, axis))) {
             let at = |offset: f64| {
@@ -121,10 +134,10 @@ fn distances_and_their_gradients_are_those_of_the_declared_elements() {
     let mut kinds = [0; 4];
     for x in states() {
         let mut contact = contact(&x);
-        contact.meet(&x);
+        update(&mut contact, &x);
         for (pair, _, closest) in active(&contact, &x) {
-            let touched: Vec<usize> = (0..4).filter(|&place| closest.weights[place] != 0.0).collect();
-            let points: Vec<Vector3<f64>> = touched.iter().map(|&place| pair.corners(&x)[place]).collect();
+            let touched: Vec<usize> = (0..4).filter(|&corner| closest.weights[corner] != 0.0).collect();
+            let points: Vec<Vector3<f64>> = touched.iter().map(|&corner| pair.corners(&x)[corner]).collect();
             let (kind, distance, gradient) = match (pair.kind, &points[..]) {
                 (PairKind::PointTriangle, &[p, a]) => {
                     let found = Distance::<f64>::new().gradient(&[p, a]);
@@ -142,12 +155,12 @@ fn distances_and_their_gradients_are_those_of_the_declared_elements() {
                     let found = EdgeEdgeDistance::<f64>::new().gradient(&[a, b, c, d]);
                     (3, found.value, found.gradient.to_vec())
                 }
-                other => panic!("{other:?} should not have joined"),
+                other => panic!("{other:?} should not be active"),
             };
             kinds[kind] += 1;
             assert!((distance - closest.distance).abs() < 1e-14, "{distance} {}", closest.distance);
-            for (gradient, place) in gradient.iter().zip(touched) {
-                let expected = closest.normal.map(|component| closest.weights[place] * component);
+            for (gradient, corner) in gradient.iter().zip(touched) {
+                let expected = closest.normal.map(|component| closest.weights[corner] * component);
                 assert!(norm(subtract(*gradient, expected)) < 1e-11, "{gradient:?} {expected:?}");
             }
         }
@@ -159,8 +172,8 @@ fn distances_and_their_gradients_are_those_of_the_declared_elements() {
 fn the_stiffness_is_the_curvature_along_the_normal() {
     for x in states() {
         let mut contact = contact(&x);
-        contact.meet(&x);
-        let found = contact.contacts(&DofMap::new(&[false; 6]), &x).concat();
+        update(&mut contact, &x);
+        let found = step(&mut contact).stiffness(&DofMap::new(&[false; 6]), &x).concat();
         assert!(!found.is_empty());
         for ((pair, law, closest), one) in active(&contact, &x).into_iter().zip(&found) {
             assert_eq!((one.weights, one.rows), (closest.weights, pair.vertices));
@@ -178,7 +191,7 @@ fn the_stiffness_is_the_curvature_along_the_normal() {
 fn stiffness_follows_the_resistance() {
     let x = states()[0].clone();
     let mut contact = contact(&x);
-    contact.meet(&x);
+    update(&mut contact, &x);
     let (_, law, _) = active(&contact, &x)[0];
     const H: f64 = 1e-4 * GAP;
     let curvature = (law.force(0.5 * GAP - H) - law.force(0.5 * GAP + H)) / (2.0 * H);
@@ -201,21 +214,21 @@ fn starts_that_cross_or_are_too_close_are_refused_by_name() {
 }
 
 #[test]
-fn moves_are_certified_and_pairs_that_block_join() {
+fn moves_are_certified_and_pairs_that_block_become_active() {
     let x = states()[0].clone();
     let mut contact = contact(&x);
     let mut through = x.clone();
     through[3..].iter_mut().for_each(|corner| corner[2] -= 0.2);
-    let part = contact.certify(&x, &through);
+    let part = step(&mut contact).filter_step(&x, &through);
     assert!(part > 0.0 && part < 0.01, "{part}");
     let mut away = x.clone();
     away[3..].iter_mut().for_each(|corner| corner[2] += 0.2);
-    assert_eq!(contact.certify(&x, &away), 1.0);
-    assert_eq!(contact.certify(&x, &[[f64::NAN; 3]; 6]), 0.0);
-    contact.meet(&x);
+    assert_eq!(step(&mut contact).filter_step(&x, &away), 1.0);
+    assert_eq!(step(&mut contact).filter_step(&x, &[[f64::NAN; 3]; 6]), 0.0);
+    update(&mut contact, &x);
     let blocked = Pair { kind: PairKind::PointTriangle, features: [3, 0], vertices: [3, 0, 1, 2] };
-    assert!(contact.joined.contains(&blocked));
-    let counts = contact.counts();
+    assert!(contact.active.contains(&blocked));
+    let counts = contact.counts;
     assert_eq!((counts.moves, counts.shortened), (2, 1));
     assert!((counts.left - part).abs() < 1e-15);
 }
@@ -231,12 +244,12 @@ fn a_part_of_a_long_move_is_certified() {
         to
     };
     // Half of the vertices move, so each moves by half the height relative to the mean.
-    assert_eq!(contact.certify(&x, &lifted(2.0)), 1.0);
-    let part = contact.certify(&x, &lifted(100.0));
+    assert_eq!(step(&mut contact).filter_step(&x, &lifted(2.0)), 1.0);
+    let part = step(&mut contact).filter_step(&x, &lifted(100.0));
     assert!((part - 0.02).abs() < 1e-12, "{part}");
     contact.begin_step(&x);
-    assert_eq!(contact.certify(&x, &lifted(100.0)), 1.0);
-    assert_eq!(contact.counts().shortened, 1);
+    assert_eq!(step(&mut contact).filter_step(&x, &lifted(100.0)), 1.0);
+    assert_eq!(contact.counts.shortened, 1);
 }
 
 /// Two layers of 4 × 4 squares of 1 cm, above each other.
@@ -248,11 +261,11 @@ fn layers() -> (CollisionMesh, Vec<Vector3<f64>>) {
         [[a, b, c], [a, c, d]]
     };
     let triangles: Vec<_> = squares.flat_map(halves).collect();
-    let place = |number: usize| {
+    let position = |number: usize| {
         let (layer, i, j) = (number / 25, number % 25 / 5, number % 5);
         [0.01 * i as f64 + 0.002 * layer as f64, 0.01 * j as f64, 0.002 * layer as f64]
     };
-    (CollisionMesh::new(50, &triangles, &[], &[]), (0..50).map(place).collect())
+    (CollisionMesh::new(50, &triangles, &[], &[]), (0..50).map(position).collect())
 }
 
 /// The contact of the layers.
@@ -265,8 +278,6 @@ fn contact_of_layers() -> BarrierContact {
 
 fn begin_step_of_layers(contact: &mut BarrierContact, x: &[Vector3<f64>]) {
     contact.begin_step(x);
-    let block = [[50.0, 0.0, 0.0], [0.0, 50.0, 0.0], [0.0, 0.0, 50.0]];
-    contact.set_resistance(&DofMap::new(&[false; 50]), vec![block; 50], vec![1.0; 50]);
 }
 
 /// Pairs of one step serve in the next, until vertices leave their balls.
@@ -279,9 +290,9 @@ fn a_step_at_rest_needs_no_search() {
     let mut searches = Vec::new();
     for way in [1e-5, -1e-5, 1e-5, 4e-3] {
         begin_step_of_layers(&mut contact, &x);
-        contact.certify(&x, &moved(&x, way));
-        contact.meet(&x);
-        searches.push(contact.counts().searches);
+        step(&mut contact).filter_step(&x, &moved(&x, way));
+        update(&mut contact, &x);
+        searches.push(contact.counts.searches);
     }
     assert_eq!(searches, [searches[0], searches[0], searches[0], searches[0] + 1]);
 }
@@ -306,16 +317,16 @@ proptest! {
                 x.iter().zip(&directions).map(|(x, direction)| add_scaled(*x, part * size, *direction)).collect()
             };
             forgetful.neighbourhood.clear();
-            let part = known.certify(&x, &moved(1.0));
-            prop_assert_eq!(part.to_bits(), forgetful.certify(&x, &moved(1.0)).to_bits());
+            let part = step(&mut known).filter_step(&x, &moved(1.0));
+            prop_assert_eq!(part.to_bits(), step(&mut forgetful).filter_step(&x, &moved(1.0)).to_bits());
             // The line search halves.
             x = moved(0.5 * part);
             forgetful.neighbourhood.clear();
-            prop_assert_eq!(known.meet(&x).to_bits(), forgetful.meet(&x).to_bits());
-            prop_assert_eq!(joined(&known), joined(&forgetful));
+            prop_assert_eq!(update(&mut known, &x).to_bits(), update(&mut forgetful, &x).to_bits());
+            prop_assert_eq!(active_laws(&known), active_laws(&forgetful));
         }
-        prop_assert!(known.counts().searches < forgetful.counts().searches);
-        prop_assert!(!known.joined.pairs.is_empty());
+        prop_assert!(known.counts.searches < forgetful.counts.searches);
+        prop_assert!(!known.active.pairs.is_empty());
     }
 
     /// While only some vertices move, certificates, changes of energy, and the pairs of these vertices and forces on
@@ -337,11 +348,11 @@ proptest! {
                 let all = x.iter().zip(&directions).enumerate();
                 all.map(|(vertex, (x, direction))| add_scaled(*x, part(vertex), *direction)).collect()
             };
-            let part = whole.certify(&x, &moved(1.0));
-            prop_assert_eq!(part.to_bits(), restricted.certify(&x, &moved(1.0)).to_bits());
+            let part = step(&mut whole).filter_step(&x, &moved(1.0));
+            prop_assert_eq!(part.to_bits(), step(&mut restricted).filter_step(&x, &moved(1.0)).to_bits());
             let next = moved(0.5 * part);
             for contact in [&mut whole, &mut restricted] {
-                contact.meet(&next);
+                update(contact, &next);
             }
             if is_local {
                 let change = |contact: &BarrierContact| contact.energy(&next) - contact.energy(&x);
@@ -356,26 +367,26 @@ proptest! {
                 for vertex in (0..50).filter(|&vertex| moving[vertex]) {
                     prop_assert!(norm(subtract(forces[1][vertex], forces[0][vertex])) <= 1e-14 * largest);
                 }
-                let mut expected = joined(&whole);
+                let mut expected = active_laws(&whole);
                 expected.retain(|(pair, _)| pair.has_any(&moving));
-                prop_assert_eq!(expected, joined(&restricted));
+                prop_assert_eq!(expected, active_laws(&restricted));
             }
             x = next;
             if number == first {
-                before = joined(&restricted);
-                restricted.restrict(&moving);
+                before = active_laws(&restricted);
+                step(&mut restricted).restrict(&moving);
             } else if number + 1 == last {
-                restricted.release();
-                let after = joined(&restricted);
+                step(&mut restricted).release();
+                let after = active_laws(&restricted);
                 prop_assert!(before.iter().all(|pair| after.contains(pair)));
             }
         }
     }
 }
 
-/// The joined pairs and their stiffness.
-fn joined(contact: &BarrierContact) -> Vec<(Pair, u64)> {
-    let Joined { pairs, laws, .. } = &contact.joined;
+/// The active pairs and their stiffness.
+fn active_laws(contact: &BarrierContact) -> Vec<(Pair, u64)> {
+    let ActiveSet { pairs, laws, .. } = &contact.active;
     pairs.iter().zip(laws).map(|(pair, law)| (*pair, law.stiffness.to_bits())).collect()
 }
 
@@ -385,7 +396,7 @@ fn threads_change_no_bit_of_many_pairs() {
     const SIDE: usize = 30;
     const VERTICES: usize = 2 * SIDE * SIDE;
     // The upper layer is shifted by a third of a cell, so that edges cross.
-    let place = |vertex: usize| -> Vector3<f64> {
+    let position = |vertex: usize| -> Vector3<f64> {
         let (layer, row, column) = (vertex / (SIDE * SIDE), vertex / SIDE % SIDE, vertex % SIDE);
         let shift = layer as f64 / 3.0;
         let wave = 1e-4 * ((7 * row + 3 * column) as f64).sin();
@@ -399,7 +410,7 @@ fn threads_change_no_bit_of_many_pairs() {
         })
     };
     let triangles: Vec<_> = cells(0).chain(cells(1)).collect();
-    let x: Vec<_> = (0..VERTICES).map(place).collect();
+    let x: Vec<_> = (0..VERTICES).map(position).collect();
     // The upper layer falls and slides, a corner of it so far that its pairs alone are searched for.
     let to = |part: f64, corner: usize| -> Vec<Vector3<f64>> {
         let falls = |vertex: usize| vertex >= SIDE * SIDE && vertex % SIDE < corner && vertex / SIDE % SIDE < corner;
@@ -413,28 +424,27 @@ fn threads_change_no_bit_of_many_pairs() {
         contact.set_threads(threads);
         contact.begin_step(&x);
         let dofs = DofMap::new(&[false; VERTICES]);
-        let block = [[50.0, 0.0, 0.0], [0.0, 50.0, 0.0], [0.0, 0.0, 50.0]];
         let mut results = Vec::new();
-        let parts = [to(1.0, SIDE), to(0.6, 8)].map(|to| contact.certify(&x, &to));
+        let parts = [to(1.0, SIDE), to(0.6, 8)].map(|to| step(&mut contact).filter_step(&x, &to));
         results.extend(parts);
-        contact.set_resistance(&dofs, vec![block; VERTICES], vec![1.0; VERTICES]);
+        step(&mut contact).lag_friction(&resistance(VERTICES));
         for corner in [SIDE, 8] {
-            let place = to(0.2 * parts[0], corner);
-            results.push(contact.meet(&place));
-            results.push(contact.energy(&place));
+            let state = to(0.2 * parts[0], corner);
+            results.push(update(&mut contact, &state));
+            results.push(contact.energy(&state));
             let mut force = vec![[0.0; 3]; VERTICES];
-            contact.add_force(&place, &mut force);
+            contact.add_force(&state, &mut force);
             results.extend(force.as_flattened());
-            let contacts = contact.contacts(&dofs, &place).concat();
-            let rubbing = contact.friction.stiffness(&place, 1).between(None, None).count();
-            assert!(rubbing > PART, "{rubbing} pairs rub");
-            assert_eq!(contacts.len(), active(&contact, &place).len() + rubbing);
+            let contacts = step(&mut contact).stiffness(&dofs, &state).concat();
+            let sticking = contact.friction.stiffness(&state, 1).between(None, None).count();
+            assert!(sticking > PART, "{sticking} pairs");
+            assert_eq!(contacts.len(), active(&contact, &state).len() + sticking);
             for Contact { weights, block, .. } in contacts {
                 results.extend(weights.iter().chain(block.as_flattened()));
             }
         }
-        assert!(contact.joined.pairs.len() > 2 * PART, "{} pairs", contact.joined.pairs.len());
-        assert!(contact.counts().shortened > 0);
+        assert!(contact.active.pairs.len() > 2 * PART, "{} pairs", contact.active.pairs.len());
+        assert!(contact.counts.shortened > 0);
         results.into_iter().map(f64::to_bits).collect::<Vec<_>>()
     };
     let one = run(1);
@@ -447,13 +457,13 @@ fn the_most_pressed_feature_is_named_with_both_sides() {
     // A vertex of the second triangle is close to the first.
     let x = states().remove(0);
     let mut contact = contact(&x);
-    assert_eq!(contact.most_pressed(&x), None);
-    contact.meet(&x);
+    assert_eq!(contact.find_most_pressed(&x), None);
+    update(&mut contact, &x);
     let pressed = |vertices: &[usize], by: &[&[usize]]| {
         let by = by.iter().map(|vertices| Presser::Vertices(vertices.to_vec())).collect();
         Some(Pressed { vertices: vertices.to_vec(), by })
     };
-    let found = contact.most_pressed(&x);
+    let found = contact.find_most_pressed(&x);
     assert!(found == pressed(&[3], &[&[0, 1, 2]]) || found == pressed(&[0, 1, 2], &[&[3]]), "{found:?}");
     // A third triangle presses the vertex from above.
     let mesh = CollisionMesh::new(9, &[[0, 1, 2], [3, 4, 5], [6, 7, 8]], &[], &[]);
@@ -463,10 +473,8 @@ fn the_most_pressed_feature_is_named_with_both_sides() {
     let x = [below, between, above].concat();
     let mut contact = BarrierContact::new(mesh, &x, vec![true; 9], vec![0.5 * THICKNESS; 9], GAP).unwrap();
     contact.begin_step(&x);
-    let block = [[50.0, 0.0, 0.0], [0.0, 50.0, 0.0], [0.0, 0.0, 50.0]];
-    contact.set_resistance(&DofMap::new(&[false; 9]), vec![block; 9], vec![1.0; 9]);
-    contact.meet(&x);
-    let found = contact.most_pressed(&x).unwrap();
+    update(&mut contact, &x);
+    let found = contact.find_most_pressed(&x).unwrap();
     assert_eq!((found.vertices.as_slice(), found.by.len()), (&[3][..], 2), "{found:?}");
 }
 
@@ -492,25 +500,24 @@ fn a_restriction_hides_no_pair_from_the_next_moves() {
     contact.begin_step(&x);
     // The next search would replace the balls of an earlier step.
     contact.neighbourhood.clear();
-    assert_eq!(contact.certify(&x, &x), 1.0);
-    contact.set_resistance(&DofMap::new(&[false; VERTICES]), vec![[[1.0; 3]; 3]; VERTICES], vec![1.0; VERTICES]);
-    contact.meet(&x);
+    assert_eq!(step(&mut contact).filter_step(&x, &x), 1.0);
+    update(&mut contact, &x);
     // The first layer is pulled out, so far that all others seem to move by several centimetres.
-    contact.restrict(&(0..VERTICES).map(|vertex| vertex < 3).collect::<Vec<_>>());
+    step(&mut contact).restrict(&(0..VERTICES).map(|vertex| vertex < 3).collect::<Vec<_>>());
     let mut here = x;
     for _ in 0..30 {
         let to = moved(&here, 0..3, [-0.03, 0.0, 0.0]);
-        let part = contact.certify(&here, &to);
+        let part = step(&mut contact).filter_step(&here, &to);
         here = moved(&here, 0..3, [-0.03 * part, 0.0, 0.0]);
-        contact.meet(&here);
+        update(&mut contact, &here);
     }
     assert!(here[0][0] < -0.5, "{}", here[0][0]);
-    contact.release();
-    let searches = contact.counts().searches;
+    step(&mut contact).release();
+    let searches = contact.counts.searches;
     let fallen = moved(&here, VERTICES - 3..VERTICES - 2, [0.002, 0.002, -0.02]);
-    let part = contact.certify(&here, &fallen);
+    let part = step(&mut contact).filter_step(&here, &fallen);
     assert!(part < 0.5, "{part}");
     // Few vertices leave their balls, so that the hierarchies of the searches before are used again.
-    assert!(contact.counts().searches == searches + 1 && !contact.search.is_unfitted());
-    assert!(contact.neighbourhood.strays().pairs().len() < 20);
+    assert!(contact.counts.searches == searches + 1 && !contact.search.is_unfitted());
+    assert!(contact.neighbourhood.escaped().pairs().len() < 20);
 }

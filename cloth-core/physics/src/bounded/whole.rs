@@ -59,6 +59,7 @@ pub struct Count<const LEAST: usize, const MOST: usize>;
 pub struct MaybeCount<const LEAST: usize, const MOST: usize>;
 
 /// N numbers of parts.
+#[non_exhaustive]
 pub struct Counts<const LEAST: usize, const MOST: usize, const N: usize>;
 
 /// A list of at least one vertex, or none.

@@ -43,12 +43,12 @@ pub struct Clearance {
 /// A straight move of all vertices.
 #[derive(Clone, Debug)]
 pub struct Move<'a> {
-    from: &'a [Vector3<f64>],
-    to: &'a [Vector3<f64>],
+    pub(crate) from: &'a [Vector3<f64>],
+    pub(crate) to: &'a [Vector3<f64>],
     /// The mean of all positions at the start, and at the end.
-    means: [Vector3<f64>; 2],
-    /// The displacement of each vertex relative to the mean, in m.
-    excursions: Vec<f64>,
+    pub(crate) means: [Vector3<f64>; 2],
+    /// The length of the displacement of each vertex relative to the mean, in m.
+    pub(crate) excursions: Vec<f64>,
     /// Bound of the rounding errors of a separation, in m.
     rounding: f64,
 }
@@ -67,32 +67,12 @@ impl<'a> Move<'a> {
         self.means.as_flattened().iter().all(|coordinate| coordinate.is_finite())
     }
 
-    /// The mean of all positions at the start, and at the end.
-    pub fn means(&self) -> [Vector3<f64>; 2] {
-        self.means
-    }
-
-    /// The positions at the start.
-    pub fn from(&self) -> &'a [Vector3<f64>] {
-        self.from
-    }
-
-    /// The positions at the end.
-    pub fn to(&self) -> &'a [Vector3<f64>] {
-        self.to
-    }
-
     /// Returns the positions after a part of the way.
     pub fn after(&self, part: f64) -> Vec<Vector3<f64>> {
         self.from.iter().zip(self.to).map(|(from, to)| add_scaled(*from, part, subtract(*to, *from))).collect()
     }
 
-    /// The length of the displacement of each vertex relative to the mean, in m.
-    pub fn excursions(&self) -> &[f64] {
-        &self.excursions
-    }
-
-    /// The largest of [`Move::excursions`].
+    /// The largest of the excursions.
     pub fn longest(&self) -> f64 {
         self.excursions.iter().copied().fold(0.0, f64::max)
     }

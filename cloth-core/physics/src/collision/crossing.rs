@@ -1,4 +1,4 @@
-//! The exact test for crossings, which judges every other part of contact.
+//! The exact test for crossings, the reference of every other part of contact.
 
 use energy_dsl::Vector3;
 use robust::{Coord, Coord3D, orient2d, orient3d};
@@ -75,13 +75,13 @@ fn crosses(mesh: &CollisionMesh, x: &[Vector3<f64>], edge: &[u32; 2], triangle: 
     let corners = triangle.map(at);
     let shared: Vec<u32> = edge.iter().copied().filter(|end| triangle.contains(end)).collect();
     match shared[..] {
-        [] if mesh.are_joined(edge, triangle) => false,
+        [] if mesh.are_adjacent(edge, triangle) => false,
         [] => segment_meets_triangle(edge.map(at), corners),
         [common] => {
             let far = if edge[0] == common { edge[1] } else { edge[0] };
-            let place = triangle.iter().position(|&corner| corner == common).unwrap_or(0);
-            let [next, last] = [1, 2].map(|step| corners[(place + step) % 3]);
-            !mesh.are_joined(&[far], triangle) && enters(at(common), at(far), [next, last])
+            let corner_number = triangle.iter().position(|&corner| corner == common).unwrap_or(0);
+            let [next, last] = [1, 2].map(|step| corners[(corner_number + step) % 3]);
+            !mesh.are_adjacent(&[far], triangle) && enters(at(common), at(far), [next, last])
         }
         _ => false,
     }

@@ -9,8 +9,8 @@ use crate::geometry::{Bounds, Hierarchy, norm, subtract};
 /// Pairs of features that do not collide: those that the scene excludes, and parts that are pinned in an obstacle.
 #[derive(Clone, Debug, Default)]
 pub struct Exclusions {
-    /// Vertices that are held in an obstacle, with its index. Their features do not collide with it.
-    held: BTreeSet<(u32, usize)>,
+    /// Vertices that are attached to an obstacle, with its index. Their features do not collide with it.
+    attached: BTreeSet<(u32, usize)>,
     /// The named sets of each vertex of cloth and hair, one bit each. Empty if no set is excluded.
     own: Vec<u64>,
     /// The same for each obstacle.
@@ -73,7 +73,7 @@ impl Exclusions {
         let some: Vec<usize> = (0..x.len()).filter(|&vertex| counts(vertex)).collect();
         let around: Vec<Bounds> =
             some.iter().map(|&vertex| Bounds::of(&[x[vertex]]).extended(0.5 * distance)).collect();
-        Hierarchy::new(&around).meeting_itself([[0, 0]], |one, other| {
+        Hierarchy::new(&around).overlaps_within([[0, 0]], |one, other| {
             let (a, b) = (some[one], some[other]);
             if norm(subtract(x[a], x[b])) < distance {
                 self.vertices.insert([index(a.min(b)), index(a.max(b))]);
@@ -82,40 +82,40 @@ impl Exclusions {
     }
 
     /// Excludes the features of a vertex that an obstacle holds from collisions with it.
-    pub fn hold(&mut self, vertex: usize, obstacle: usize) {
-        self.held.insert((index(vertex), obstacle));
+    pub fn attach(&mut self, vertex: usize, obstacle: usize) {
+        self.attached.insert((index(vertex), obstacle));
     }
 
     /// Returns the exclusions among some vertices, with their new numbers.
     pub fn restricted(&self, local: &[Option<usize>], vertices: usize) -> Self {
         let mut own = vec![0; vertices];
-        for (sets, place) in self.own.iter().zip(local) {
-            if let Some(place) = place {
-                own[*place] = *sets;
+        for (sets, new) in self.own.iter().zip(local) {
+            if let Some(new) = new {
+                own[*new] = *sets;
             }
         }
-        let place = |vertex: u32| local[vertex as usize].map(index);
-        let renumbered = |&[a, b]: &[u32; 2]| Some([place(a)?, place(b)?]).map(|[a, b]| [a.min(b), a.max(b)]);
+        let new = |vertex: u32| local[vertex as usize].map(index);
+        let renumbered = |&[a, b]: &[u32; 2]| Some([new(a)?, new(b)?]).map(|[a, b]| [a.min(b), a.max(b)]);
         let vertices = self.vertices.iter().filter_map(renumbered).collect();
-        let held = self.held.iter().filter_map(|&(vertex, obstacle)| Some((place(vertex)?, obstacle))).collect();
+        let attached = self.attached.iter().filter_map(|&(vertex, obstacle)| Some((new(vertex)?, obstacle))).collect();
         let (obstacles, sets) = (self.obstacles.clone(), self.sets.clone());
-        Self { held, own, obstacles, sets, vertices, names: BTreeMap::new() }
+        Self { attached, own, obstacles, sets, vertices, names: BTreeMap::new() }
     }
 
     /// Whether a pair of features does not collide.
     pub fn exclude(&self, mesh: &CollisionMesh, a: &[u32], b: &[u32]) -> bool {
-        self.are_held(mesh, a, b) || self.exclude_sets(mesh, a, b) || self.exclude_vertices(a, b)
+        self.are_attached(mesh, a, b) || self.exclude_sets(mesh, a, b) || self.exclude_vertices(a, b)
     }
 
     /// Whether one of two features is an obstacle's that holds a vertex of the other.
-    fn are_held(&self, mesh: &CollisionMesh, a: &[u32], b: &[u32]) -> bool {
-        if self.held.is_empty() {
+    fn are_attached(&self, mesh: &CollisionMesh, a: &[u32], b: &[u32]) -> bool {
+        if self.attached.is_empty() {
             return false;
         }
-        let holds = |obstacle: Option<usize>, other: &[u32]| {
-            obstacle.is_some_and(|obstacle| other.iter().any(|vertex| self.held.contains(&(*vertex, obstacle))))
+        let attaches = |obstacle: Option<usize>, other: &[u32]| {
+            obstacle.is_some_and(|obstacle| other.iter().any(|vertex| self.attached.contains(&(*vertex, obstacle))))
         };
-        holds(mesh.obstacle(a[0]), b) || holds(mesh.obstacle(b[0]), a)
+        attaches(mesh.obstacle(a[0]), b) || attaches(mesh.obstacle(b[0]), a)
     }
 
     fn exclude_sets(&self, mesh: &CollisionMesh, a: &[u32], b: &[u32]) -> bool {

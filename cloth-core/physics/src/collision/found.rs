@@ -7,7 +7,7 @@ use super::{CollisionMesh, Pair, PairKind};
 /// Fewer pairs are put in order on one thread.
 const FEW_PAIRS: usize = 4096;
 
-/// Features by their places in the mesh's lists, as pairs are ordered.
+/// Features by their numbers in the mesh's lists, as pairs are ordered.
 pub(super) type Features = [u32; 2];
 
 /// The features that a search found.
@@ -67,15 +67,15 @@ fn pairs_in_order(mesh: &CollisionMesh, kind: PairKind, features: Vec<Features>)
 fn sorted(mut features: Vec<Features>, counts: [usize; 2]) -> Vec<Features> {
     let mut sorted = vec![[0; 2]; features.len()];
     for key in [1, 0] {
-        let mut places = vec![0; counts[key] + 1];
-        features.iter().for_each(|one| places[one[key] as usize + 1] += 1);
-        for number in 1..places.len() {
-            places[number] += places[number - 1];
+        let mut starts = vec![0; counts[key] + 1];
+        features.iter().for_each(|one| starts[one[key] as usize + 1] += 1);
+        for number in 1..starts.len() {
+            starts[number] += starts[number - 1];
         }
         for one in &features {
-            let place = &mut places[one[key] as usize];
-            sorted[*place] = *one;
-            *place += 1;
+            let next = &mut starts[one[key] as usize];
+            sorted[*next] = *one;
+            *next += 1;
         }
         std::mem::swap(&mut features, &mut sorted);
     }

@@ -3,27 +3,27 @@ use energy_dsl::{Kernel, Lane, Level, Vector3, dispatch};
 use super::closest::corners;
 use super::{Closest, Pair, PairKind};
 
-/// The closest points of many pairs at one place.
+/// The closest points of many pairs at one state.
 #[derive(Clone, Debug, Default)]
 pub struct Measured {
-    /// The place; empty if nothing has been measured.
-    place: Vec<Vector3<f64>>,
+    /// The positions where pairs were measured; empty before that.
+    x: Vec<Vector3<f64>>,
     /// Weights, normal and distance of each pair.
     numbers: Vec<[f64; 8]>,
     separations: Vec<f64>,
 }
 
-/// Consecutive pairs, to be measured at one place.
+/// Consecutive pairs, to be measured at one state.
 #[derive(Debug)]
 pub struct Unmeasured<'a> {
     pairs: &'a [Pair],
-    /// The place; `None` if the pairs have been measured there.
-    place: Option<&'a [Vector3<f64>]>,
+    /// The positions; `None` if the pairs have been measured there.
+    x: Option<&'a [Vector3<f64>]>,
     numbers: &'a mut [[f64; 8]],
     separations: &'a mut [f64],
 }
 
-/// The closest points of consecutive pairs at one place.
+/// The closest points of consecutive pairs at one state.
 #[derive(Clone, Copy, Debug)]
 pub struct MeasuredPart<'a> {
     /// The pairs.
@@ -41,20 +41,20 @@ impl Measured {
         x: &'a [Vector3<f64>],
         length: usize,
     ) -> impl Iterator<Item = Unmeasured<'a>> {
-        let is_known = self.numbers.len() == pairs.len() && (pairs.is_empty() || self.place == x);
+        let is_known = self.numbers.len() == pairs.len() && (pairs.is_empty() || self.x == x);
         if !is_known {
-            x.clone_into(&mut self.place);
+            x.clone_into(&mut self.x);
             self.numbers.resize(pairs.len(), [0.0; 8]);
             self.separations.resize(pairs.len(), 0.0);
         }
-        let place = (!is_known).then_some(x);
+        let unmeasured_at = (!is_known).then_some(x);
         let parts = pairs.chunks(length).zip(self.numbers.chunks_mut(length)).zip(self.separations.chunks_mut(length));
-        parts.map(move |((pairs, numbers), separations)| Unmeasured { pairs, place, numbers, separations })
+        parts.map(move |((pairs, numbers), separations)| Unmeasured { pairs, x: unmeasured_at, numbers, separations })
     }
 
     /// Discards everything. Required if pairs change.
     pub fn clear(&mut self) {
-        self.place.clear();
+        self.x.clear();
         self.numbers.clear();
         self.separations.clear();
     }
@@ -63,8 +63,8 @@ impl Measured {
 impl<'a> Unmeasured<'a> {
     /// Measures the pairs.
     pub fn measured(self) -> MeasuredPart<'a> {
-        let Self { pairs, place, numbers, separations } = self;
-        if let Some(x) = place {
+        let Self { pairs, x, numbers, separations } = self;
+        if let Some(x) = x {
             dispatch(Measure { pairs, x, numbers, separations });
         }
         MeasuredPart { pairs, numbers, separations }

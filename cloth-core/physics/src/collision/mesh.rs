@@ -103,7 +103,7 @@ impl CollisionMesh {
     /// The obstacle that a vertex belongs to; `None` for cloth and hair.
     #[inline]
     pub fn obstacle(&self, vertex: u32) -> Option<usize> {
-        (vertex as usize).checked_sub(self.own).map(|place| self.owners[place] as usize)
+        (vertex as usize).checked_sub(self.own).map(|number| self.owners[number] as usize)
     }
 
     /// The obstacle of a pair; `None` for two features of cloth and hair.
@@ -202,14 +202,14 @@ impl CollisionMesh {
 
     /// Whether two features have a vertex in common, or vertices that are sewn together.
     #[inline]
-    pub(super) fn are_joined<const M: usize, const N: usize>(&self, a: &[u32; M], b: &[u32; N]) -> bool {
-        let mut joined = false;
+    pub(super) fn are_adjacent<const M: usize, const N: usize>(&self, a: &[u32; M], b: &[u32; N]) -> bool {
+        let mut adjacent = false;
         for p in a {
             for q in b {
-                joined |= p == q;
+                adjacent |= p == q;
             }
         }
-        joined || self.has_seams && self.are_sewn(a, b)
+        adjacent || self.has_seams && self.are_sewn(a, b)
     }
 
     fn are_sewn(&self, a: &[u32], b: &[u32]) -> bool {

@@ -1,5 +1,5 @@
-//! Geometry of collisions: an exact test for crossings, pairs of features that may meet, and a certificate that a
-//! straight move keeps them apart.
+//! Geometry of collisions: an exact test for crossings, pairs of features that may come in contact, and a certificate
+//! that a straight move keeps them apart.
 //!
 //! A surface is a [`CollisionMesh`] of points, edges and triangles. Two kinds of pairs suffice: a point and a
 //! triangle, and two edges. If no such pair touches while all vertices move, no edge ever crosses a triangle: the first
@@ -9,6 +9,7 @@
 //! Obstacles join the mesh with the cores of their solids. The vertices of cores follow those of the cloth, and move as
 //! prescribed.
 
+mod candidates;
 mod certificate;
 mod closest;
 mod crossing;
@@ -18,7 +19,6 @@ mod found;
 mod measured;
 mod mesh;
 mod moving_balls;
-mod nearby;
 mod neighbourhood;
 mod pair;
 mod plane;
@@ -32,6 +32,7 @@ mod solid_core;
 mod tiling;
 mod trees;
 
+pub use candidates::Candidates;
 pub use certificate::{Clearance, Move};
 pub use closest::Closest;
 pub use crossing::{Crossing, crossings};
@@ -39,7 +40,6 @@ pub use exclusions::{Exclusions, Members};
 pub use measured::{Measured, MeasuredPart};
 pub use mesh::CollisionMesh;
 pub use moving_balls::MovingBalls;
-pub use nearby::Nearby;
 pub use neighbourhood::Neighbourhood;
 pub use pair::{Pair, PairKind};
 pub use search::{Rules, Search};

@@ -27,7 +27,7 @@ impl PairKind {
 pub struct Pair {
     /// The kinds of the two features.
     pub kind: PairKind,
-    /// The places of the two features in the mesh's lists of points, triangles and edges.
+    /// The numbers of the two features in the mesh's lists of points, triangles and edges.
     pub features: [u32; 2],
     /// The vertices of the first feature, then those of the second.
     pub vertices: [u32; 4],

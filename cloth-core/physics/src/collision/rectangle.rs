@@ -1,27 +1,27 @@
 //! Triangles and rectangles in a plane.
 
-/// A place in a plane, in m.
-pub(super) type Place = [f64; 2];
+/// A point in a plane, in m.
+pub(super) type PlanePoint = [f64; 2];
 
 /// A part of the length of a rectangle that is too narrow to count as inside.
 const INSIDE: f64 = 1e-9;
 
 /// Twice the signed area of a triangle, in m².
-pub(super) fn doubled_area([a, b, c]: [Place; 3]) -> f64 {
+pub(super) fn doubled_area([a, b, c]: [PlanePoint; 3]) -> f64 {
     (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
 }
 
 /// The least height of a triangle, in m. 0 for one without area.
-pub(super) fn least_height(corners: [Place; 3]) -> f64 {
+pub(super) fn least_height(corners: [PlanePoint; 3]) -> f64 {
     let [a, b, c] = corners;
-    let length = |p: Place, q: Place| (q[0] - p[0]).hypot(q[1] - p[1]);
+    let length = |p: PlanePoint, q: PlanePoint| (q[0] - p[0]).hypot(q[1] - p[1]);
     let longest = length(a, b).max(length(b, c)).max(length(c, a));
     // `max` takes 0 for NaN.
     (doubled_area(corners).abs() / longest).max(0.0)
 }
 
 /// The inverse of the matrix with the sides b − a and c − a as columns.
-pub(super) fn inverse([a, b, c]: [Place; 3]) -> [[f64; 2]; 2] {
+pub(super) fn inverse([a, b, c]: [PlanePoint; 3]) -> [[f64; 2]; 2] {
     let determinant = doubled_area([a, b, c]);
     [[c[1] - a[1], a[0] - c[0]], [a[1] - b[1], b[0] - a[0]]].map(|row| row.map(|entry| entry / determinant))
 }
@@ -29,17 +29,17 @@ pub(super) fn inverse([a, b, c]: [Place; 3]) -> [[f64; 2]; 2] {
 /// A rectangle along the axes of a plane.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Rectangle {
-    pub low: Place,
-    pub high: Place,
+    pub low: PlanePoint,
+    pub high: PlanePoint,
 }
 
 impl Rectangle {
-    /// The rectangle that contains no place.
+    /// The rectangle that contains no point.
     pub const EMPTY: Self = Self { low: [f64::INFINITY; 2], high: [f64::NEG_INFINITY; 2] };
 
-    /// Returns the smallest rectangle around this one and a place.
-    pub fn with(self, place: Place) -> Self {
-        let (low, high) = ([0, 1].map(|a| self.low[a].min(place[a])), [0, 1].map(|a| self.high[a].max(place[a])));
+    /// Returns the smallest rectangle around this one and a point.
+    pub fn with(self, point: PlanePoint) -> Self {
+        let (low, high) = ([0, 1].map(|a| self.low[a].min(point[a])), [0, 1].map(|a| self.high[a].max(point[a])));
         Self { low, high }
     }
 
@@ -74,11 +74,11 @@ impl Rectangle {
     }
 
     /// The area that the rectangle has in common with a triangle, in m².
-    pub fn common_area(&self, corners: [Place; 3]) -> f64 {
+    pub fn common_area(&self, corners: [PlanePoint; 3]) -> f64 {
         let mut polygon = corners.to_vec();
         for axis in 0..2 {
-            polygon = cut(&polygon, |place| self.low[axis] - place[axis]);
-            polygon = cut(&polygon, |place| place[axis] - self.high[axis]);
+            polygon = cut(&polygon, |point| self.low[axis] - point[axis]);
+            polygon = cut(&polygon, |point| point[axis] - self.high[axis]);
         }
         let fan = polygon.windows(2).map(|side| doubled_area([polygon[0], side[0], side[1]]));
         0.5 * fan.sum::<f64>().abs()
@@ -86,7 +86,7 @@ impl Rectangle {
 }
 
 /// Returns the part of a convex polygon that is not beyond a line.
-fn cut(polygon: &[Place], beyond: impl Fn(&Place) -> f64) -> Vec<Place> {
+fn cut(polygon: &[PlanePoint], beyond: impl Fn(&PlanePoint) -> f64) -> Vec<PlanePoint> {
     let mut kept = Vec::with_capacity(polygon.len() + 1);
     for (number, here) in polygon.iter().enumerate() {
         let next = &polygon[(number + 1) % polygon.len()];

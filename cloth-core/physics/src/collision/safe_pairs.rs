@@ -47,7 +47,7 @@ impl Kernel for Test<'_> {
                 (thickness[lane], reach[lane]) = (clearance.thickness, clearance.reach);
             }
             let (thickness, reach) = (L::F64::load(&thickness), L::F64::load(&reach));
-            let [from, to] = [corners::<L>(step.from(), &vertices), corners::<L>(step.to(), &vertices)];
+            let [from, to] = [corners::<L>(step.from, &vertices), corners::<L>(step.to, &vertices)];
             let start = Closest::between(kind, &from);
             let level = step.level(start.distance, thickness, reach);
             let at_end = separation(&start.normal, &to, kind.first());

@@ -19,7 +19,7 @@ const CHANGED: usize = 512;
 /// Pairs of tiles that a thread takes at a time.
 const TILES: usize = 64;
 
-/// Finds the pairs whose vertices may meet within given regions.
+/// Finds the candidate pairs of vertices within given regions.
 #[derive(Clone, Debug)]
 pub struct Search {
     tiling: Arc<Tiling>,
@@ -101,8 +101,8 @@ impl<'a> Wanted<'a> {
 impl Search {
     /// Prepares searches in a mesh that starts at x.
     pub fn new(mesh: &CollisionMesh, x: &[Vector3<f64>], rules: Rules) -> Self {
-        let place = |vertex: usize| MovingBounds::fixed(Bounds::of(&[x[vertex]]));
-        let boxes = Boxes::new(mesh, place, &rules.halves, 1);
+        let position = |vertex: usize| MovingBounds::fixed(Bounds::of(&[x[vertex]]));
+        let boxes = Boxes::new(mesh, position, &rules.halves, 1);
         let own = mesh.own_features();
         let all = [mesh.points().len(), mesh.triangles().len(), mesh.edges().len()];
         let mut tiling = Tiling::new(mesh, x);
@@ -256,7 +256,7 @@ impl Search {
         }
     }
 
-    /// Returns the pairs of tiles, or of a tile with itself, with features that may meet while each vertex stays in its
+    /// Returns the pairs of tiles, or of a tile with itself, with candidate pairs while each vertex stays in its
     /// ball.
     fn crowded(&mut self, shapes: &Shapes<'_>, balls: &MovingBalls<'_>, threads: usize) -> Vec<[usize; 2]> {
         let reaches = shapes.reaches(balls.radii, &self.rules.halves, threads);
@@ -270,7 +270,7 @@ impl Search {
                 }
             };
             (0..reaches.len()).for_each(|tile| add(tile, tile));
-            self.tiles.meeting_itself([[0, 0]], add);
+            self.tiles.overlaps_within([[0, 0]], add);
         }
         crowded
     }
@@ -280,7 +280,7 @@ impl Search {
         self.obstacles.refit(boxes, 1);
         let near = |tree: &Hierarchy<RoundedMovingBounds>| {
             let mut near = Vec::new();
-            self.tiles.meeting(tree, [[0, 0]], |tile, _| near.push(tile));
+            self.tiles.overlaps_with(tree, [[0, 0]], |tile, _| near.push(tile));
             near.sort_unstable();
             near.dedup();
             near
@@ -290,7 +290,7 @@ impl Search {
         NearObstacles { points: near(points), triangles: near(triangles), edges }
     }
 
-    /// Returns all pairs within their reach at x, and others whose boxes meet, in order.
+    /// Returns all pairs within their reach at x, and others whose boxes overlap, in order.
     pub fn pairs_at(&mut self, mesh: &CollisionMesh, x: &[Vector3<f64>]) -> Vec<Pair> {
         self.pairs(mesh, &MovingBalls { ends: [x, x], radii: &vec![0.0; x.len()] })
     }
@@ -299,12 +299,12 @@ impl Search {
     fn find(&self, task: &Task<'_>, mesh: &CollisionMesh) -> Found {
         let (Self { own, obstacles, .. }, mut found) = (self, Found::default());
         match *task {
-            Task::Edges(tiles) => own.edges.meeting_itself(tiles.iter().copied(), |one, other| {
+            Task::Edges(tiles) => own.edges.overlaps_within(tiles.iter().copied(), |one, other| {
                 self.add_edges(mesh, one, other, &mut found);
             }),
             Task::PointsOnTriangles(tiles) => {
                 let reversed = tiles.iter().filter(|[a, b]| a != b).map(|&[a, b]| [b, a]);
-                own.points.meeting(&own.triangles, tiles.iter().copied().chain(reversed), |point, triangle| {
+                own.points.overlaps_with(&own.triangles, tiles.iter().copied().chain(reversed), |point, triangle| {
                     self.add_point_and_triangle(mesh, point, triangle, &mut found);
                 });
             }
@@ -312,13 +312,13 @@ impl Search {
                 let [points, triangles, edges] = obstacles.first;
                 // All features of obstacles are in one group.
                 let group = |&tile: &usize| [tile, 0];
-                own.points.meeting(&obstacles.triangles, near.triangles.iter().map(group), |point, triangle| {
+                own.points.overlaps_with(&obstacles.triangles, near.triangles.iter().map(group), |point, triangle| {
                     self.add_point_and_triangle(mesh, point, triangles + triangle, &mut found);
                 });
-                own.triangles.meeting(&obstacles.points, near.points.iter().map(group), |triangle, point| {
+                own.triangles.overlaps_with(&obstacles.points, near.points.iter().map(group), |triangle, point| {
                     self.add_point_and_triangle(mesh, points + point, triangle, &mut found);
                 });
-                own.edges.meeting(&obstacles.edges, near.edges.iter().map(group), |one, other| {
+                own.edges.overlaps_with(&obstacles.edges, near.edges.iter().map(group), |one, other| {
                     self.add_edges(mesh, one, edges + other, &mut found);
                 });
             }
@@ -333,9 +333,9 @@ impl Search {
     }
 
     /// Returns the pairs with a changed vertex that can come within their reach while each vertex stays in its region,
-    /// and others whose boxes meet. Regions do not move. That of a vertex that is not changed lies in its region of the
-    /// searches before, at one instant. Its box there serves: a box at rest meets a moving one if they overlap at any
-    /// instant.
+    /// and others whose boxes overlap. Regions do not move. That of a vertex that is not changed lies in its region of
+    /// the searches before, at one instant. Its box there serves: a box at rest meets a moving one if they overlap at
+    /// any instant.
     pub fn pairs_with(
         &mut self,
         is_changed: &[bool],
@@ -410,16 +410,16 @@ impl Search {
     #[inline]
     fn add_point_and_triangle(&self, mesh: &CollisionMesh, point: usize, triangle: usize, found: &mut Found) {
         let (p, corners) = ([mesh.points()[point]], mesh.triangles()[triangle]);
-        if !mesh.are_joined(&p, &corners) && self.can_collide(mesh, &p, &corners) {
+        if !mesh.are_adjacent(&p, &corners) && self.can_collide(mesh, &p, &corners) {
             found.on_triangles.push([index(point), index(triangle)]);
         }
     }
 
-    /// Adds two edges if they can collide. Most edges that meet are neighbours: that test is inlined.
+    /// Adds two edges if they can collide. Most edges whose boxes overlap are neighbours: that test is inlined.
     #[inline(always)]
     fn add_edges(&self, mesh: &CollisionMesh, one: usize, other: usize, found: &mut Found) {
         let (a, b) = (mesh.edges()[one], mesh.edges()[other]);
-        if !mesh.are_joined(&a, &b) {
+        if !mesh.are_adjacent(&a, &b) {
             self.add_separate_edges(mesh, [one, other], [a, b], found);
         }
     }
@@ -437,7 +437,7 @@ impl Search {
         }
     }
 
-    /// Whether two features that are not joined may respond to a contact, and no rule excludes them.
+    /// Whether two features that are not adjacent may respond to a contact, and no rule excludes them.
     fn can_collide(&self, mesh: &CollisionMesh, a: &[u32], b: &[u32]) -> bool {
         a.iter().chain(b).any(|vertex| self.rules.is_free[*vertex as usize])
             && !self.rules.exclusions.exclude(mesh, a, b)

@@ -10,12 +10,12 @@ pub const PART: usize = 4096;
 /// The part of its distance beyond reach that a pair may lose before it is measured again.
 const LOST: f64 = 0.25;
 
-/// How far many pairs are apart at one place, with the closest points of those within reach. Most pairs are not, so
+/// How far many pairs are apart at one state, with the closest points of those within reach. Most pairs are not, so
 /// little memory is moved.
 #[derive(Clone, Debug, Default)]
 pub struct Separations {
-    /// The place; empty if nothing has been measured.
-    pub place: Vec<Vector3<f64>>,
+    /// The positions where pairs were measured; empty before that.
+    pub x: Vec<Vector3<f64>>,
     /// A lower bound of the distance of each pair; see [`Closest::separation`].
     pub all: Vec<f64>,
     /// The pairs within reach, in order.
@@ -40,11 +40,11 @@ impl Separations {
             *self = Self::default();
             return;
         }
-        let is_known = self.all.len() == pairs.len() && self.place.len() == x.len();
-        if is_known && self.place == x {
+        let is_known = self.all.len() == pairs.len() && self.x.len() == x.len();
+        if is_known && self.x == x {
             return;
         }
-        let before = std::mem::replace(&mut self.place, x.to_vec());
+        let before = std::mem::replace(&mut self.x, x.to_vec());
         // A look at the whole move costs more than a few pairs do.
         let step = (is_known && pairs.len() > x.len() / 4).then(|| Move::new(&before, x));
         self.all.resize(pairs.len(), 0.0);

@@ -1,10 +1,10 @@
 use energy_dsl::Vector3;
 
 use super::CollisionMesh;
-use super::rectangle::Place;
+use super::rectangle::PlanePoint;
 use crate::geometry::{add_scaled, cross, dot, norm, subtract};
 
-/// A connected part of a mesh, projected on a plane at the start. Features are given by their places in the mesh's
+/// A connected part of a mesh, projected on a plane at the start. Features are given by their numbers in the mesh's
 /// lists.
 #[derive(Debug, Default)]
 pub(super) struct Sheet {
@@ -30,7 +30,7 @@ impl Sheet {
     }
 
     /// Projects the vertices of the sheet on a plane across its mean normal, with an outer edge along the first axis.
-    pub fn project(&self, mesh: &CollisionMesh, x: &[Vector3<f64>], places: &mut [Place]) {
+    pub fn project(&self, mesh: &CollisionMesh, x: &[Vector3<f64>], points: &mut [PlanePoint]) {
         let at = |vertex: u32| x[vertex as usize];
         let normal = self.triangles.iter().fold([0.0; 3], |sum, &triangle| {
             let [a, b, c] = mesh.triangles()[triangle].map(at);
@@ -45,7 +45,7 @@ impl Sheet {
         let is_plane = axes.as_flattened().iter().all(|component| component.is_finite());
         let axes = if is_plane { axes } else { [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]] };
         for vertex in self.points.iter().map(|&point| mesh.points()[point] as usize) {
-            places[vertex] = axes.map(|axis| dot(subtract(x[vertex], origin), axis));
+            points[vertex] = axes.map(|axis| dot(subtract(x[vertex], origin), axis));
         }
     }
 }

@@ -1,6 +1,6 @@
 //! Smooth parts of sheets, which have no pairs.
 //!
-//! The projection of a sheet at the start gives each of its points a place X in a plane. Let x(X) be the point in space
+//! The projection of a sheet at the start gives each of its points a point X in a plane. Let x(X) be the point in space
 //! later on. Its derivative F, a 3 × 2 matrix, is constant in each triangle. Consider a rectangle that the sheet covers
 //! once, and a 2 × 3 matrix P with |P F − 1| ≤ ε in all triangles that meet the rectangle. The straight line from X to
 //! Y stays in it, and the integral of F along this line gives
@@ -10,7 +10,7 @@
 //! In the plane, the nearest points of two features without a common vertex are apart by at least w, the least height
 //! of these triangles. One of the points is a vertex. The line to the other leaves the triangles around that vertex
 //! across an opposite side, so it is at least as long as a height. All such features in the rectangle are apart by at
-//! least (1 − ε) w / |P| in space. If vertices stray by r at most from where F is known, 2 r less is left. If that
+//! least (1 − ε) w / |P| in space. If vertices move by r at most from where F is known, 2 r less is left. If that
 //! exceeds the reach, the rectangle has no pairs.
 //!
 //! On a straight move F is linear in time, so |P F − 1| is at most as large as at one of the ends. P is the left
@@ -157,7 +157,7 @@ struct Look<'a> {
     tiles: &'a [Tile],
     /// Whether F matters in each of these tiles.
     matters: &'a [bool],
-    /// The places of vertices at the start and at the end.
+    /// The positions of vertices at the start and at the end.
     ends: &'a [Vec<Column>; 2],
 }
 
@@ -259,7 +259,7 @@ impl Entries {
 }
 
 impl Reference {
-    /// The derivative F of the place in space by that in the plane, by columns.
+    /// The derivative F of the point in space by that in the plane, by columns.
     #[inline(always)]
     fn derivative(&self, x: &[Column]) -> [Column; 2] {
         let [a, b, c] = self.corners;

@@ -116,13 +116,13 @@ fn meander() -> impl Strategy<Value = Meander> {
 fn meandering(scene: &Scene, (slope, wavelength, phase, stretch): Meander) -> Vec<Vector3<f64>> {
     const STEP: f64 = 1e-3;
     let angle = |along: f64| slope * (std::f64::consts::TAU * along / wavelength + phase).sin();
-    let place = |&[a, b, c]: &Vector3<f64>| {
+    let bend = |&[a, b, c]: &Vector3<f64>| {
         let steps = (a.abs() / STEP).round() as i32;
         let tangents = (0..steps).map(|step| angle((f64::from(step) + 0.5) * STEP * a.signum()));
         let sum = tangents.fold([0.0; 2], |[x, z], angle| [x + angle.cos(), z + angle.sin()]);
         [STEP * a.signum() * sum[0], stretch * b, STEP * a.signum() * sum[1] + c]
     };
-    scene.x.iter().map(place).collect()
+    scene.x.iter().map(bend).collect()
 }
 
 proptest! {
@@ -149,8 +149,8 @@ proptest! {
         let all = search.pairs(&mesh, &balls);
         for (found, radii) in [(&near, &radii[..]), (&all, balls.radii)] {
             let x = at(&from, &to, instant);
-            let stray = |vertex: usize| add_scaled(x[vertex], radii[vertex], noise[vertex].1);
-            let x: Vec<_> = (0..count).map(stray).collect();
+            let moved = |vertex: usize| add_scaled(x[vertex], radii[vertex], noise[vertex].1);
+            let x: Vec<_> = (0..count).map(moved).collect();
             for pair in all_pairs(&mesh) {
                 let is_known = found.binary_search(&pair).is_ok();
                 let apart = Closest::of(&pair, &pair.corners(&x)).distance;

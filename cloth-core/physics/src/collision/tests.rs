@@ -47,7 +47,7 @@ fn on_grid() -> impl Strategy<Value = Vector3<f64>> {
     prop::array::uniform3((-4_i32..=4).prop_map(|number| 0.01 * f64::from(number)))
 }
 
-/// The place of a corner, and its displacement relative to the triangle.
+/// The position of a corner, and its displacement relative to the triangle.
 type Corner = (Vector3<f64>, Vector3<f64>);
 
 /// Positions of the six corners before and after an impact. The triangles fly at each other with up to 100 m/s during
@@ -62,10 +62,10 @@ fn impact() -> impl Strategy<Value = [Vec<Vector3<f64>>; 2]> {
             let length = subtract(velocity, [0.0; 3]).iter().map(|c| c * c).sum::<f64>().sqrt().max(1e-3);
             let direction = velocity.map(|component| component / length);
             let velocity = direction.map(|component| -speed * component);
-            let placed = |(number, &(corner, _)): (usize, &Corner)| {
+            let position = |(number, &(corner, _)): (usize, &Corner)| {
                 if number < 3 { corner } else { add_scaled(corner, gap, direction) }
             };
-            let from: Vec<_> = corners.iter().enumerate().map(placed).collect();
+            let from: Vec<_> = corners.iter().enumerate().map(position).collect();
             let moved = |(number, (from, (_, spread))): (usize, (&Vector3<f64>, &Corner))| {
                 add_scaled(add_scaled(*from, 1.0, *spread), if number < 3 { 0.0 } else { 1.0 }, velocity)
             };
@@ -117,10 +117,10 @@ proptest! {
     ) {
         let (pairs, mut separations) = (pairs(), Separations::default());
         for time in ends {
-            let place = at(&x, &y, 0.02 * time);
-            separations.measure(&pairs, &place, &[half; 6], 1);
+            let state = at(&x, &y, 0.02 * time);
+            separations.measure(&pairs, &state, &[half; 6], 1);
             let mut fresh = Separations::default();
-            fresh.measure(&pairs, &place, &[half; 6], 1);
+            fresh.measure(&pairs, &state, &[half; 6], 1);
             for (bound, separation) in separations.all.iter().zip(&fresh.all) {
                 prop_assert!(bound <= separation, "{} {}", bound, separation);
                 prop_assert!(bound == separation || *bound > 2.0 * half, "{} {}", bound, separation);
@@ -132,7 +132,7 @@ proptest! {
         }
     }
 
-    /// No impact passes, judged by the exact test along the accepted move.
+    /// No impact passes, by the exact test along the accepted move.
     #[test]
     fn no_impact_passes([from, to] in impact()) {
         const THICKNESS: f64 = 1e-3;
@@ -180,9 +180,9 @@ fn sheet(cells: usize) -> (CollisionMesh, Vec<Vector3<f64>>) {
         [[a, b, c], [a, c, d]]
     };
     let triangles: Vec<_> = squares.flat_map(halves).collect();
-    let place = |number: usize| [0.01 * (number / (cells + 1)) as f64, 0.01 * (number % (cells + 1)) as f64, 0.0];
+    let position = |number: usize| [0.01 * (number / (cells + 1)) as f64, 0.01 * (number % (cells + 1)) as f64, 0.0];
     let vertices = (cells + 1) * (cells + 1);
-    (CollisionMesh::new(vertices, &triangles, &[], &[]), (0..vertices).map(place).collect())
+    (CollisionMesh::new(vertices, &triangles, &[], &[]), (0..vertices).map(position).collect())
 }
 
 #[test]
@@ -231,12 +231,13 @@ fn sewn_vertices_count_as_one() {
 
 const REACH: f64 = 3e-3;
 
-/// Returns a pair within reach at x that a neighbourhood does not know, and its distance.
+/// Returns a pair within reach at x that a neighbourhood misses, and its distance.
 fn missing(mesh: &CollisionMesh, neighbourhood: &Neighbourhood, x: &[Vector3<f64>]) -> Option<(Pair, f64)> {
-    let is_known =
-        |pair: &Pair| neighbourhood.nearby().pairs().contains(pair) || neighbourhood.strays().pairs().contains(pair);
+    let is_candidate = |pair: &Pair| {
+        neighbourhood.candidates().pairs().contains(pair) || neighbourhood.escaped().pairs().contains(pair)
+    };
     let distances = all_pairs(mesh).into_iter().map(|pair| (pair, Closest::of(&pair, &pair.corners(x)).distance));
-    distances.filter(|(_, distance)| *distance <= REACH).find(|(pair, _)| !is_known(pair))
+    distances.filter(|(_, distance)| *distance <= REACH).find(|(pair, _)| !is_candidate(pair))
 }
 
 /// All features of a sheet collide within a reach.
@@ -261,23 +262,24 @@ proptest! {
         }).collect();
         let mut search = Search::new(&mesh, &flat, rules(REACH));
         let mut neighbourhood = Neighbourhood::default();
-        prop_assert!(!neighbourhood.knows(&from));
-        prop_assert!(neighbourhood.follow(&mut search, &mesh, &Move::new(&from, &to), |_| 1e-3, [2e-4, 4e-3]));
-        let found = neighbourhood.strays().pairs();
+        prop_assert!(!neighbourhood.covers(&from));
+        prop_assert!(neighbourhood.search_along(&mut search, &mesh, &Move::new(&from, &to), |_| 1e-3, [2e-4, 4e-3]));
+        let found = neighbourhood.escaped().pairs();
         prop_assert!(found.is_sorted() && found.windows(2).all(|two| two[0] != two[1]));
         prop_assert_eq!(missing(&mesh, &neighbourhood, &at(&from, &to, instant)), None);
 
         let x = at(&from, &to, end);
-        prop_assert!(neighbourhood.knows(&x));
-        neighbourhood.settle(&search, &x);
-        prop_assert!(neighbourhood.strays().pairs().is_empty());
+        prop_assert!(neighbourhood.covers(&x));
+        neighbourhood.refit(&search, &x);
+        prop_assert!(neighbourhood.escaped().pairs().is_empty());
         // Anywhere in the balls.
-        let astray: Vec<_> = x.iter().zip(&offsets).map(|(x, (.., stray))| add_scaled(*x, 5e-4, *stray)).collect();
+        let moved: Vec<_> = x.iter().zip(&offsets).map(|(x, (.., offset))| add_scaled(*x, 5e-4, *offset)).collect();
         prop_assert_eq!(missing(&mesh, &neighbourhood, &x), None);
-        prop_assert_eq!(missing(&mesh, &neighbourhood, &astray), None);
+        prop_assert_eq!(missing(&mesh, &neighbourhood, &moved), None);
     }
 
-    /// Moves on which a few vertices leave their balls miss no pair, one after the other, whether they are made or not.
+    /// Moves on which a few vertices escape from their balls miss no pair, one after the other, whether they are made
+    /// or not.
     #[test]
     fn moves_of_a_few_vertices_miss_no_pair(
         offsets in prop::collection::vec((vector(0.012), vector(0.02)), 25),
@@ -289,49 +291,49 @@ proptest! {
         let mut search = Search::new(&mesh, &flat, rules(REACH));
         let mut neighbourhood = Neighbourhood::default();
         // All vertices move and stop half the way.
-        neighbourhood.follow(&mut search, &mesh, &Move::new(&from, &to), |_| 5e-3, [1e-3, 8e-3]);
+        neighbourhood.search_along(&mut search, &mesh, &Move::new(&from, &to), |_| 5e-3, [1e-3, 8e-3]);
         let mut x = at(&from, &to, 0.5);
-        neighbourhood.settle(&search, &x);
-        for (strays, part) in &moves {
+        neighbourhood.refit(&search, &x);
+        for (escapes, part) in &moves {
             let mut to = x.clone();
-            for &(vertex, stray) in strays {
-                to[vertex] = add_scaled(x[vertex], 1.0, stray);
+            for &(vertex, by) in escapes {
+                to[vertex] = add_scaled(x[vertex], 1.0, by);
             }
-            neighbourhood.follow(&mut search, &mesh, &Move::new(&x, &to), |_| 1e-3, [2e-4, 4e-3]);
+            neighbourhood.search_along(&mut search, &mesh, &Move::new(&x, &to), |_| 1e-3, [2e-4, 4e-3]);
             for instant in [0.0, 0.3, 0.7, 1.0] {
                 prop_assert_eq!(missing(&mesh, &neighbourhood, &at(&x, &to, instant)), None);
             }
             // Short parts stand for moves that are not made.
             if *part > 0.3 {
                 x = at(&x, &to, *part);
-                prop_assert!(neighbourhood.knows(&x));
-                neighbourhood.settle(&search, &x);
+                prop_assert!(neighbourhood.covers(&x));
+                neighbourhood.refit(&search, &x);
                 prop_assert_eq!(missing(&mesh, &neighbourhood, &x), None);
             }
         }
     }
 
-    /// Places off the path of a stray are not known.
+    /// States off the path of an escaped vertex are not covered.
     #[test]
-    fn only_places_on_the_way_are_known(move_by in vector(0.02), aside in vector(1e-3), part in 0.0..1.0_f64) {
+    fn only_states_on_the_path_are_covered(move_by in vector(0.02), aside in vector(1e-3), part in 0.0..1.0_f64) {
         let (mesh, x) = sheet(4);
         let mut search = Search::new(&mesh, &x, rules(REACH));
         let mut neighbourhood = Neighbourhood::default();
-        neighbourhood.follow(&mut search, &mesh, &Move::new(&x, &x), |_| 1e-4, [1e-4; 2]);
-        neighbourhood.settle(&search, &x);
+        neighbourhood.search_along(&mut search, &mesh, &Move::new(&x, &x), |_| 1e-4, [1e-4; 2]);
+        neighbourhood.refit(&search, &x);
         let moved = |by: Vector3<f64>| {
             let mut moved = x.clone();
             moved[7] = add_scaled(x[7], 1.0, by);
             moved
         };
         let to = moved(move_by);
-        neighbourhood.follow(&mut search, &mesh, &Move::new(&x, &to), |_| 1e-4, [1e-4; 2]);
-        prop_assert!(neighbourhood.knows(&at(&x, &to, part)));
+        neighbourhood.search_along(&mut search, &mesh, &Move::new(&x, &to), |_| 1e-4, [1e-4; 2]);
+        prop_assert!(neighbourhood.covers(&at(&x, &to, part)));
         let beside = moved(add_scaled(aside, part, move_by));
         let along = crate::geometry::dot(aside, move_by).powi(2);
         let square = |v: Vector3<f64>| crate::geometry::dot(v, v);
         let is_beside = square(aside) > 1e-7 && along < 0.5 * square(aside) * square(move_by);
-        prop_assert!(!is_beside || part < 0.1 || square(move_by) < 1e-5 || !neighbourhood.knows(&beside));
+        prop_assert!(!is_beside || part < 0.1 || square(move_by) < 1e-5 || !neighbourhood.covers(&beside));
     }
 
     /// The closest points are those of a dense search, and the weights reproduce the distance.
@@ -364,9 +366,9 @@ proptest! {
 /// All pairs of a mesh that share no vertex.
 pub(super) fn all_pairs(mesh: &CollisionMesh) -> Vec<Pair> {
     let mut all = Vec::new();
-    for (place, &p) in mesh.points().iter().enumerate() {
+    for (point, &p) in mesh.points().iter().enumerate() {
         for (number, corners) in mesh.triangles().iter().enumerate().filter(|(_, corners)| !corners.contains(&p)) {
-            let ([a, b, c], features) = (*corners, [place, number].map(energy_solve::index));
+            let ([a, b, c], features) = (*corners, [point, number].map(energy_solve::index));
             all.push(Pair { kind: PairKind::PointTriangle, features, vertices: [p, a, b, c] });
         }
     }

@@ -3,7 +3,7 @@ use std::ops::RangeInclusive;
 use energy_dsl::Vector3;
 
 use super::CollisionMesh;
-use super::rectangle::{Place, Rectangle, doubled_area, inverse, least_height};
+use super::rectangle::{PlanePoint, Rectangle, doubled_area, inverse, least_height};
 use super::sheet::Sheet;
 use super::trees::Kind;
 
@@ -22,7 +22,7 @@ const COVERED: f64 = 1e-9;
 #[derive(Clone, Debug)]
 pub(super) struct Tiling {
     pub tiles: Vec<Tile>,
-    /// The tiles of each block. Empty unless exactly one triangle covers each place of the rectangle around its
+    /// The tiles of each block. Empty unless exactly one triangle covers each point of the rectangle around its
     /// features.
     pub blocks: Vec<Vec<usize>>,
     of_points: Vec<usize>,
@@ -72,10 +72,10 @@ impl Tiling {
         let (of_points, of_triangles, of_edges) = (vec![0; points], vec![0; triangles], vec![0; edges]);
         let (tiles, blocks, grids) = Default::default();
         let mut tiling = Self { tiles, blocks, of_points, of_triangles, of_edges, grids };
-        let mut places = vec![[0.0; 2]; x.len()];
+        let mut points = vec![[0.0; 2]; x.len()];
         for sheet in Sheet::all(mesh) {
-            sheet.project(mesh, x, &mut places);
-            tiling.add(&Projected { mesh, sheet, places: &places });
+            sheet.project(mesh, x, &mut points);
+            tiling.add(&Projected { mesh, sheet, points: &points });
         }
         tiling
     }
@@ -172,22 +172,22 @@ impl Grid {
 struct Projected<'a> {
     mesh: &'a CollisionMesh,
     sheet: Sheet,
-    /// The place of each vertex.
-    places: &'a [Place],
+    /// The point of each vertex in the plane.
+    points: &'a [PlanePoint],
 }
 
 impl Projected<'_> {
-    fn place(&self, vertex: u32) -> Place {
-        self.places[vertex as usize]
+    fn point(&self, vertex: u32) -> PlanePoint {
+        self.points[vertex as usize]
     }
 
-    fn middle(&self, vertices: &[u32]) -> Place {
-        let mean = |axis: usize| vertices.iter().map(|vertex| self.place(*vertex)[axis]).sum::<f64>();
+    fn middle(&self, vertices: &[u32]) -> PlanePoint {
+        let mean = |axis: usize| vertices.iter().map(|vertex| self.point(*vertex)[axis]).sum::<f64>();
         [mean(0), mean(1)].map(|sum| sum / vertices.len() as f64)
     }
 
     fn hull(&self, vertices: impl Iterator<Item = u32>) -> Rectangle {
-        vertices.map(|vertex| self.place(vertex)).fold(Rectangle::EMPTY, Rectangle::with)
+        vertices.map(|vertex| self.point(vertex)).fold(Rectangle::EMPTY, Rectangle::with)
     }
 
     /// The vertices of the sheet.
@@ -197,8 +197,8 @@ impl Projected<'_> {
 
     /// Whether the two triangles of an edge are on different sides of it.
     fn continues_across(&self, edge: usize) -> bool {
-        let [a, b] = self.mesh.edges()[edge].map(|vertex| self.place(vertex));
-        let height = |apex: u32| doubled_area([a, b, self.place(apex)]);
+        let [a, b] = self.mesh.edges()[edge].map(|vertex| self.point(vertex));
+        let height = |apex: u32| doubled_area([a, b, self.point(apex)]);
         matches!(*self.mesh.apexes(edge), [p, q] if height(p) * height(q) < 0.0)
     }
 }
@@ -216,7 +216,7 @@ impl Frame {
     fn of(sheet: &Projected<'_>) -> Self {
         let around = sheet.hull(sheet.vertices());
         let length = |edge: &usize| {
-            let [a, b] = sheet.mesh.edges()[*edge].map(|vertex| sheet.place(vertex));
+            let [a, b] = sheet.mesh.edges()[*edge].map(|vertex| sheet.point(vertex));
             (b[0] - a[0]).hypot(b[1] - a[1])
         };
         let edges = &sheet.sheet.edges;
@@ -232,9 +232,9 @@ impl Frame {
         Self { around, size, tile: [0, 1].map(|axis| around.length(axis) / size[axis] as f64) }
     }
 
-    /// Column and row of the tile around a place.
-    fn cell(&self, place: Place) -> [usize; 2] {
-        [0, 1].map(|axis| self.along(axis, place[axis]))
+    /// Column and row of the tile around a point.
+    fn cell(&self, point: PlanePoint) -> [usize; 2] {
+        [0, 1].map(|axis| self.along(axis, point[axis]))
     }
 
     fn along(&self, axis: usize, coordinate: f64) -> usize {
@@ -287,12 +287,12 @@ impl Frame {
         };
         for &triangle in triangles {
             let corners = mesh.triangles()[triangle];
-            let places = corners.map(|vertex| sheet.place(vertex));
+            let points = corners.map(|vertex| sheet.point(vertex));
             let (hull, numbers) = near(&corners);
             for tile in numbers.filter(|tile| hulls[*tile].has_inside(&hull)) {
-                tiles[tile].height = tiles[tile].height.min(least_height(places));
-                tiles[tile].triangles.push(Reference { corners, inverse: inverse(places) });
-                covered[tile] += hulls[tile].common_area(places);
+                tiles[tile].height = tiles[tile].height.min(least_height(points));
+                tiles[tile].triangles.push(Reference { corners, inverse: inverse(points) });
+                covered[tile] += hulls[tile].common_area(points);
             }
         }
         let is_one = |covered: f64, area: f64| (covered - area).abs() <= COVERED * area;
@@ -380,12 +380,12 @@ mod tests {
     #[test]
     fn a_narrow_ring_has_far_fewer_tiles_than_edges() {
         const CELLS: usize = 3000;
-        let place = |number: usize| {
+        let point = |number: usize| {
             let (angle, radius) =
                 ((number / 2) as f64 / CELLS as f64 * std::f64::consts::TAU, 1.0 + 2e-3 * (number % 2) as f64);
             [radius * angle.cos(), radius * angle.sin(), 0.0]
         };
-        let x: Vec<Vector3<f64>> = (0..2 * CELLS).map(place).collect();
+        let x: Vec<Vector3<f64>> = (0..2 * CELLS).map(point).collect();
         let corner = |number: usize| number % (2 * CELLS);
         let cell = |cell: usize| [[2 * cell, 2 * cell + 1, 2 * cell + 2], [2 * cell + 1, 2 * cell + 3, 2 * cell + 2]];
         let triangles: Vec<_> = (0..CELLS).flat_map(cell).map(|corners| corners.map(corner)).collect();

@@ -10,7 +10,7 @@ use crate::geometry::{Hierarchy, MovingBounds, RoundedMovingBounds, Volume};
 /// Vertices that a thread takes at a time.
 const VERTICES: usize = 2048;
 
-/// Hierarchies of the points, triangles and edges from certain places in the mesh's lists on.
+/// Hierarchies of the points, triangles and edges from certain numbers in the mesh's lists on.
 #[derive(Clone, Debug)]
 pub(super) struct Trees {
     pub points: Hierarchy<RoundedMovingBounds>,
@@ -73,7 +73,7 @@ impl<'a> Boxes<'a> {
 }
 
 impl Trees {
-    /// Builds the hierarchies of some features, by their places in the mesh's lists.
+    /// Builds the hierarchies of some features, by their numbers in the mesh's lists.
     pub fn new(boxes: &Boxes<'_>, features: [Range<usize>; 3], tile_of: impl Fn(Kind, usize) -> usize) -> Self {
         let first = features.each_ref().map(|range| range.start);
         let tree = |kind: Kind, features: Range<usize>| {
@@ -105,7 +105,7 @@ impl Trees {
         });
     }
 
-    /// Changes each hierarchy, given its kind and the place of its first feature.
+    /// Changes each hierarchy, given its kind and the number of its first feature.
     fn each(&mut self, threads: usize, change: impl Fn(&mut Hierarchy<RoundedMovingBounds>, Kind, usize) + Sync) {
         let Self { points, triangles, edges, first: [p, t, e] } = self;
         // There are as many edges as triangles and points.

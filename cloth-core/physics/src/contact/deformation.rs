@@ -42,7 +42,7 @@ impl Deformation {
     /// Returns the vertices at a time, in m.
     #[must_use]
     pub fn vertices(&self, time: f64) -> Vec<Vector3<f64>> {
-        let (before, part) = self.place(time);
+        let (before, part) = self.frame_at(time);
         let [from, to] = [before, before + 1].map(|frame| &self.frames[frame.min(self.frames.len() - 1)]);
         from.iter().zip(to).map(|(from, to)| add_scaled(*from, part, subtract(*to, *from))).collect()
     }
@@ -50,18 +50,18 @@ impl Deformation {
     /// Whether vertices may move between two times, in s.
     #[must_use]
     pub fn moves(&self, from: f64, to: f64) -> bool {
-        self.place(from) != self.place(to)
+        self.frame_at(from) != self.frame_at(to)
     }
 
     /// The frame before a time, and the part of the way to the next one.
-    fn place(&self, time: f64) -> (usize, f64) {
+    fn frame_at(&self, time: f64) -> (usize, f64) {
         let last = self.frames.len() - 1;
-        let place = (time * self.rate).clamp(0.0, last as f64);
-        let frame = (place as usize).min(last);
-        (frame, place - frame as f64)
+        let frames = (time * self.rate).clamp(0.0, last as f64);
+        let frame = (frames as usize).min(last);
+        (frame, frames - frame as f64)
     }
 
-    /// Returns the motion of a point that is fixed to the nearest of some triangles at the start: it keeps its place
+    /// Returns the motion of a point that is fixed to the nearest of some triangles at the start: it keeps its position
     /// relative to the corners and the normal.
     pub fn carried(&self, x: Vector3<f64>, triangles: &[[usize; 3]]) -> Motion {
         let start = &self.frames[0];

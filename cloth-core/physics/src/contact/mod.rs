@@ -7,7 +7,7 @@
 //! On a mesh, the nearest face, edge or corner acts as a plane, a capsule or a sphere of radius 0.
 //!
 //! Only vertices touch solids, not the triangles between them. The integrator `newton` does not use these terms:
-//! [`crate::barrier`] knows the cores of solids.
+//! [`crate::barrier`] acts on the cores of solids.
 
 mod cores;
 mod deformation;
@@ -79,6 +79,19 @@ impl AnySolid {
             Self::Box(solid) => solid.signed_distance(x),
             Self::Mesh(solid) => solid.nearest(x).distance,
         }
+    }
+
+    /// Returns a vector along which the signed distance grows fastest, by its differences over a step, in m; zero at
+    /// the centre.
+    pub(crate) fn outwards(&self, x: [f64; 3], step: f64) -> [f64; 3] {
+        std::array::from_fn(|axis| {
+            let moved = |by: f64| {
+                let mut x = x;
+                x[axis] += by;
+                self.signed_distance(x)
+            };
+            moved(step) - moved(-step)
+        })
     }
 }
 

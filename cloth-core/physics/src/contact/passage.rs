@@ -92,12 +92,12 @@ fn passes(solid: &AnySolid, start: Vector3<f64>, end: Vector3<f64>, thickness: f
     let mut entered = None;
     loop {
         if entered.is_none() && distance < 0.0 {
-            entered = Some(outwards(solid, at(walked), least));
+            entered = Some(solid.outwards(at(walked), least));
         }
         let has_left = entered.is_some() && distance >= 0.0;
         if has_left || walked >= length {
             let Some(normal) = entered else { return false };
-            return dot(normal, outwards(solid, at(walked), least)) < 0.0;
+            return dot(normal, solid.outwards(at(walked), least)) < 0.0;
         }
         // Far outside, the solid is out of reach.
         if entered.is_none() && distance > length - walked {
@@ -106,18 +106,6 @@ fn passes(solid: &AnySolid, start: Vector3<f64>, end: Vector3<f64>, thickness: f
         walked = (walked + distance.abs().max(least)).min(length);
         distance = solid.signed_distance(at(walked));
     }
-}
-
-/// Returns the direction in which contact pushes, by differences of the signed distance.
-fn outwards(solid: &AnySolid, x: Vector3<f64>, step: f64) -> Vector3<f64> {
-    std::array::from_fn(|axis| {
-        let moved = |by: f64| {
-            let mut x = x;
-            x[axis] += by;
-            solid.signed_distance(x)
-        };
-        moved(step) - moved(-step)
-    })
 }
 
 #[cfg(test)]

@@ -8,6 +8,7 @@ use crate::mesh::{TriangleMesh, vertex_angles};
 /// A mesh that does not bound a solid.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[expect(missing_docs, reason = "the messages name the fields")]
+#[non_exhaustive]
 pub enum SurfaceError {
     /// Two neighbouring triangles have opposite orientations.
     #[error(

@@ -7,6 +7,7 @@ use super::plate::{PlateError, RigidityError, ThreadError};
 /// A fabric that does not fit a mesh.
 #[derive(Debug, thiserror::Error)]
 #[expect(missing_docs, reason = "the messages name the fields")]
+#[non_exhaustive]
 pub enum FabricError {
     /// A triangle is rejected as a rest shape.
     #[error("triangle {triangle}: {source}")]

@@ -3,7 +3,7 @@ use energy_elements::{HairBend, HookeSpring};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-use super::{FabricError, FabricTerms, Place, Surroundings};
+use super::{FabricError, FabricTerms, Surroundings, SystemPart};
 use crate::bounded::{Count, Direction, MaybeReals, NonNegative, Number, Positive, Real, Reals};
 use crate::geometry::norm;
 
@@ -95,8 +95,8 @@ impl Hair {
 ///
 /// # Errors
 /// Returns an error if there are more vertices than an index can hold.
-pub fn hair_terms(hair: &Hair, surroundings: &Surroundings, place: Place) -> Result<FabricTerms, FabricError> {
-    let mut terms = FabricTerms::new(hair.masses(), place);
+pub fn hair_terms(hair: &Hair, surroundings: &Surroundings, part: SystemPart) -> Result<FabricTerms, FabricError> {
+    let mut terms = FabricTerms::new(hair.masses(), part);
     let starts = || (0..hair.count).map(|strand| strand * (hair.segments + 1));
     let segments: Vec<[usize; 2]> =
         starts().flat_map(|start| (start..start + hair.segments).map(|at| [at, at + 1])).collect();

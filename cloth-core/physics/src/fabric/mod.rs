@@ -20,5 +20,5 @@ pub use error::FabricError;
 pub use hair::{Hair, hair_terms};
 pub use library::{MEASURED, MeasuredFabric};
 pub use plate::{PlateTerm, Rigidity};
-pub use terms::{FabricTerms, Place, Surroundings, terms, terms_at};
+pub use terms::{FabricTerms, Surroundings, SystemPart, terms, terms_at};
 pub use warp_choice::MaybeWarpChoice;

@@ -26,9 +26,9 @@ pub struct Surroundings {
     pub drag: f64,
 }
 
-/// The position of a mesh among several in one system.
+/// The part of a system that a mesh takes.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Place {
+pub struct SystemPart {
     /// Offset of its vertices in the system.
     pub first: usize,
     /// Prefix of its terms' names.
@@ -46,7 +46,7 @@ pub struct FabricTerms {
     pub left_out: Vec<String>,
     /// Warnings about the fabric.
     pub warnings: Vec<String>,
-    place: Place,
+    part: SystemPart,
 }
 
 /// Creates the terms of a fabric on a mesh. Only mass–spring fabrics use `springs`.
@@ -59,7 +59,7 @@ pub fn terms(
     springs: &SpringNetwork,
     surroundings: &Surroundings,
 ) -> Result<FabricTerms, FabricError> {
-    terms_at(fabric, mesh, springs, surroundings, Place::default())
+    terms_at(fabric, mesh, springs, surroundings, SystemPart::default())
 }
 
 /// Creates the terms of a fabric on one of several meshes in a system.
@@ -71,10 +71,10 @@ pub fn terms_at(
     mesh: &TriangleMesh,
     springs: &SpringNetwork,
     surroundings: &Surroundings,
-    place: Place,
+    part: SystemPart,
 ) -> Result<FabricTerms, FabricError> {
     let masses = lumped_masses(mesh, fabric.density);
-    let mut terms = FabricTerms::new(masses, place);
+    let mut terms = FabricTerms::new(masses, part);
     let plasticity = fabric.plasticity.unwrap_or_default();
     let cloth = MaterialMesh { mesh, triangles: material_triangles(mesh, fabric)?, warp: fabric.warp, plasticity };
     check_plasticity(fabric)?;
@@ -207,8 +207,8 @@ fn stable_neo_hookean_log(
 }
 
 impl FabricTerms {
-    pub(super) fn new(masses: Vec<f64>, place: Place) -> Self {
-        Self { masses, terms: Vec::new(), left_out: Vec::new(), warnings: Vec::new(), place }
+    pub(super) fn new(masses: Vec<f64>, part: SystemPart) -> Self {
+        Self { masses, terms: Vec::new(), left_out: Vec::new(), warnings: Vec::new(), part }
     }
 
     fn add_springs(
@@ -272,18 +272,18 @@ impl FabricTerms {
         stencils: &[[usize; N]],
         law: L,
     ) {
-        let (name, stencils) = (self.named(name), self.placed(stencils));
+        let (name, stencils) = (self.named(name), self.in_system(stencils));
         self.terms.push(Box::new(DrivenTerm::new(name, law, &stencils)));
     }
 
     /// Prefixes the name of a term.
     fn named(&self, name: &str) -> String {
-        format!("{}{name}", self.place.prefix)
+        format!("{}{name}", self.part.prefix)
     }
 
     /// Numbers vertices as in the system.
-    fn placed<const N: usize>(&self, stencils: &[[usize; N]]) -> Vec<[usize; N]> {
-        stencils.iter().map(|stencil| stencil.map(|vertex| self.place.first + vertex)).collect()
+    fn in_system<const N: usize>(&self, stencils: &[[usize; N]]) -> Vec<[usize; N]> {
+        stencils.iter().map(|stencil| stencil.map(|vertex| self.part.first + vertex)).collect()
     }
 
     /// Adds a membrane and returns its λ and μ.
@@ -301,7 +301,7 @@ impl FabricTerms {
     }
 
     fn add_declared(&mut self, declared: &Declared, cloth: &MaterialMesh<'_>, density: f64) -> Result<(), FabricError> {
-        let Place { first, prefix } = &self.place;
+        let SystemPart { first, prefix } = &self.part;
         let (mesh, triangles) = (cloth.mesh, cloth.triangles.as_slice());
         let terms = declared.terms(&TargetMesh { mesh, triangles, density, first: *first, prefix })?;
         self.terms.extend(terms.into_iter().map(|term| -> Box<dyn Term> { Box::new(term) }));
@@ -327,7 +327,7 @@ impl FabricTerms {
     ) -> Result<(), FabricError> {
         let (beta, triangles) = (rayleigh.stretching, cloth.mesh.triangles());
         if !self.leave_out("membrane damping", beta * mu == 0.0, triangles.len()) {
-            let (triangles, rest) = (self.placed(triangles), cloth.triangles.clone());
+            let (triangles, rest) = (self.in_system(triangles), cloth.triangles.clone());
             let law = MembraneDamping { triangles: triangles.clone(), rest, viscosities: [beta * lambda, beta * mu] };
             self.terms.push(Box::new(DissipationTerm::new(self.named("membrane damping"), law, &triangles)));
         }
@@ -335,7 +335,7 @@ impl FabricTerms {
         let hinges = Topology::of(cloth.mesh).hinges;
         if !self.leave_out("bending damping", beta * rigidity == 0.0, hinges.len()) {
             let stencils: Vec<[usize; 4]> = hinges.iter().map(|hinge| hinge.vertices).collect();
-            let stencils = self.placed(&stencils);
+            let stencils = self.in_system(&stencils);
             // c ‖e‖²/(A₁ + A₂) θ² gives a sheet with regular diagonals the rigidity 2c along its grid.
             let viscosity = |hinge| 2.0 * beta * rigidity * shape_factor(cloth.mesh, hinge);
             let law = HingeDamping { hinges: stencils.clone(), viscosities: hinges.iter().map(viscosity).collect() };
@@ -354,7 +354,7 @@ impl FabricTerms {
                 None => plate,
             };
             if !self.leave_out("bending", is_zero, plate.triangles()) {
-                self.terms.push(Box::new(plate.on_vertices_from(self.place.first)));
+                self.terms.push(Box::new(plate.on_vertices_from(self.part.first)));
             }
             return Ok(());
         }
@@ -455,14 +455,14 @@ impl FabricTerms {
     ) -> Result<ElementList<E>, ListError> {
         // The list lives as long as the cloth: release spare capacity.
         elements.shrink_to_fit();
-        ElementList::new(self.named(name), elements, &self.placed(stencils))
+        ElementList::new(self.named(name), elements, &self.in_system(stencils))
     }
 
     /// Records a term to be left out. Returns whether it is: its stiffness is zero, or it has no elements.
     pub(super) fn leave_out(&mut self, name: &str, is_zero: bool, elements: usize) -> bool {
         match (is_zero, elements) {
-            (true, _) => self.left_out.push(format!("{}{name}: zero", self.place.prefix)),
-            (false, 0) => self.left_out.push(format!("{}{name}: nothing to act on", self.place.prefix)),
+            (true, _) => self.left_out.push(format!("{}{name}: zero", self.part.prefix)),
+            (false, 0) => self.left_out.push(format!("{}{name}: nothing to act on", self.part.prefix)),
             (false, _) => return false,
         }
         true

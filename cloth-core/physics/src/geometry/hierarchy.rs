@@ -17,8 +17,8 @@ pub struct Hierarchy<B = Bounds> {
     pub(super) boxes: Vec<B>,
     /// The same boxes, for comparisons in lanes.
     pub(super) rounded: RoundedBoxes,
-    /// The place of each item in `items`.
-    places: Vec<usize>,
+    /// The position of each item in `items`.
+    positions: Vec<usize>,
     /// The nodes of each group, the first of which holds all its items.
     groups: Vec<Range<usize>>,
 }
@@ -70,11 +70,11 @@ impl<B: Volume> Hierarchy<B> {
             items: Vec::new(),
             boxes: Vec::new(),
             rounded: RoundedBoxes::default(),
-            places: vec![0; bounds.len()],
+            positions: vec![0; bounds.len()],
             groups: vec![0..0; groups.last().map_or(1, |last| last.number + 1)],
         };
         tree.build_groups(bounds, &mut groups);
-        tree.items.iter().enumerate().for_each(|(place, &item)| tree.places[item] = place);
+        tree.items.iter().enumerate().for_each(|(position, &item)| tree.positions[item] = position);
         tree.boxes = tree.items.iter().map(|&item| bounds[item]).collect();
         tree.rounded.set(&tree.boxes);
         tree
@@ -145,9 +145,9 @@ impl<B: Volume> Hierarchy<B> {
     /// Adapts the boxes of a group to new boxes of its items. Nodes with several groups keep theirs.
     pub fn refit_group(&mut self, group: usize, bounds: impl Fn(usize) -> B) {
         let Some(root) = self.root(group) else { return };
-        for place in self.nodes[root].from..self.nodes[root].to {
-            self.boxes[place] = bounds(self.items[place]);
-            self.rounded.replace(place, &self.boxes[place]);
+        for position in self.nodes[root].from..self.nodes[root].to {
+            self.boxes[position] = bounds(self.items[position]);
+            self.rounded.replace(position, &self.boxes[position]);
         }
         self.refit_nodes(self.groups[group].clone());
     }
@@ -165,29 +165,30 @@ impl<B: Volume> Hierarchy<B> {
 
     /// Adapts the tree to new boxes of some items.
     pub fn refit_some(&mut self, items: impl Iterator<Item = usize>, bounds: impl Fn(usize) -> B) {
-        let mut places = Vec::new();
+        let mut positions = Vec::new();
         for item in items {
-            let place = self.places[item];
-            self.boxes[place] = bounds(item);
-            self.rounded.replace(place, &self.boxes[place]);
-            places.push(place);
+            let position = self.positions[item];
+            self.boxes[position] = bounds(item);
+            self.rounded.replace(position, &self.boxes[position]);
+            positions.push(position);
         }
-        places.sort_unstable();
-        self.refit_places(0, &places);
+        positions.sort_unstable();
+        self.refit_positions(0, &positions);
     }
 
-    /// Adapts a node to the new boxes at some places in it, in order.
-    fn refit_places(&mut self, number: usize, places: &[usize]) {
-        if places.is_empty() {
+    /// Adapts a node to the new boxes at some positions in it, in order.
+    fn refit_positions(&mut self, number: usize, positions: &[usize]) {
+        if positions.is_empty() {
             return;
         }
         let Node { from, to, second, .. } = self.nodes[number];
         self.nodes[number].bounds = match second {
             None => self.boxes[from..to].iter().copied().fold(B::empty(), B::joined),
             Some(second) => {
-                let (before, after) = places.split_at(places.partition_point(|place| *place < self.nodes[second].from));
-                self.refit_places(number + 1, before);
-                self.refit_places(second, after);
+                let (before, after) =
+                    positions.split_at(positions.partition_point(|position| *position < self.nodes[second].from));
+                self.refit_positions(number + 1, before);
+                self.refit_positions(second, after);
                 self.nodes[number + 1].bounds.joined(self.nodes[second].bounds)
             }
         };

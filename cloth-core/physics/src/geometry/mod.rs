@@ -2,8 +2,8 @@
 
 mod bounds;
 mod hierarchy;
-mod meeting;
 mod near;
+mod overlap;
 mod pose;
 mod rounded_boxes;
 

@@ -37,8 +37,8 @@ impl<B: Volume, F: FnMut(usize)> Kernel for Near<'_, B, F> {
             }
             match node.second {
                 None => {
-                    for place in tree.rounded.overlapping::<L, B>(node.from, node.to, &rounded) {
-                        found(tree.items[place]);
+                    for position in tree.rounded.overlapping::<L, B>(node.from, node.to, &rounded) {
+                        found(tree.items[position]);
                     }
                 }
                 Some(second) => {

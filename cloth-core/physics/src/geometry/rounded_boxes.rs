@@ -66,9 +66,9 @@ impl RoundedBoxes {
         first: usize,
         other: &RoundedMovingBounds,
     ) -> <L::F32 as Number>::Mask {
-        let (mut begins, mut ends) = self.instants[0].meet::<L>(axis, first, other.at(0));
+        let (mut begins, mut ends) = self.instants[0].overlap_masks::<L>(axis, first, other.at(0));
         for instant in 1..B::INSTANTS {
-            let (one, two) = self.instants[instant].meet::<L>(axis, first, other.at(instant));
+            let (one, two) = self.instants[instant].overlap_masks::<L>(axis, first, other.at(instant));
             (begins, ends) = (begins | one, ends | two);
         }
         begins & ends
@@ -98,7 +98,7 @@ impl Iterator for Overlapping {
 impl Corners {
     /// Whether boxes from number `first` on begin before another one ends along an axis, and end after it begins.
     #[inline(always)]
-    fn meet<L: Level>(
+    fn overlap_masks<L: Level>(
         &self,
         axis: usize,
         first: usize,

@@ -73,7 +73,7 @@ impl Integrator for Bdf2 {
                 };
                 // Pinned vertices move by their velocities: Newton's step will add the other two thirds.
                 let third = moved_by_velocities(body, dt / 3.0);
-                for vertex in (0..third.len()).filter(|&vertex| body.system.dofs().place(vertex).is_none()) {
+                for vertex in (0..third.len()).filter(|&vertex| body.system.dofs().row(vertex).is_none()) {
                     (from.x[vertex], from.v[vertex]) = (third[vertex], here.v[vertex]);
                 }
                 start_from(body, &here, &from, &mut self.newton, 2.0 / 3.0 * dt)?

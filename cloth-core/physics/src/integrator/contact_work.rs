@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 /// The work of contact, and how often it shortened moves.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
+#[non_exhaustive]
 pub struct ContactWork {
     /// Searches for pairs that may collide.
     pub searches: u64,

@@ -3,6 +3,7 @@ use energy_solve::{CholeskyError, EvaluationError, Pressed, SingularBlock, StopR
 /// A step that failed. The message says what failed, and [`StepError::advice`] what may help.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[expect(missing_docs, reason = "the messages name the fields")]
+#[non_exhaustive]
 pub enum StepError {
     /// A force could not be evaluated.
     #[error(transparent)]
@@ -33,40 +34,40 @@ pub enum StepError {
     /// The line search of Newton's method failed: no step along the direction lowers the energy.
     #[error(
         "no step along the direction of Newton iteration {iterations} lowers the energy \
-         (its linear system: {stopped}){}", place(.pressed)
+         (its linear system: {stopped}){}", where_pressed(.pressed)
     )]
     Stuck {
         /// Newton iterations.
         iterations: u64,
         /// Why the linear solver stopped.
         stopped: StopReason,
-        /// The place where contact presses the most, if it shortened a move of this step.
+        /// The feature that contact presses the most, if it shortened a move of this step.
         pressed: Option<Pressed>,
     },
-    /// Contact does not let pins and obstacles reach their places at the end of the step.
+    /// Contact does not let pins and obstacles reach their positions at the end of the step.
     #[error(
         "contact stopped pins and obstacles after {:.1} % of their way, in {moves} moves{}", 100.0 * .part,
-        place(.pressed)
+        where_pressed(.pressed)
     )]
     PinsBlocked {
         /// Moves of the pins and obstacles.
         moves: usize,
         /// The part of their way that they went.
         part: f64,
-        /// The place where contact presses the most.
+        /// The feature that contact presses the most.
         pressed: Option<Pressed>,
     },
     /// Newton's method did not converge.
     #[error(
         "Newton's method did not converge in {iterations} iterations: \
-         the last changed a velocity by {change:.3e} m/s{}", place(.pressed)
+         the last changed a velocity by {change:.3e} m/s{}", where_pressed(.pressed)
     )]
     NotConverged {
         /// Newton iterations.
         iterations: u64,
         /// The largest change of a velocity component in the last iteration, in m/s.
         change: f64,
-        /// The place where contact presses the most, if it shortened a move of this step.
+        /// The feature that contact presses the most, if it shortened a move of this step.
         pressed: Option<Pressed>,
     },
     /// A force has neither an energy nor a dissipation function, so Newton's method cannot minimise anything.
@@ -206,7 +207,7 @@ fn joined<'a>(alternatives: impl IntoIterator<Item = &'a str>) -> Option<String>
 }
 
 /// Says where contact presses the most.
-fn place(pressed: &Option<Pressed>) -> String {
+fn where_pressed(pressed: &Option<Pressed>) -> String {
     pressed.as_ref().map(|pressed| format!("; contact {pressed}")).unwrap_or_default()
 }
 

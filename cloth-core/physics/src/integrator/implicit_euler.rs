@@ -43,7 +43,7 @@ struct Options(SolveOptions);
 impl Default for Options {
     /// A relative residual of 10⁻⁵ is far below the scheme's own error at any useful step.
     fn default() -> Self {
-        Self(SolveOptions { relative_tolerance: 1e-5, iteration_limit: 5_000 })
+        Self(SolveOptions::new(1e-5).with_iteration_limit(5_000))
     }
 }
 
@@ -69,7 +69,7 @@ impl ImplicitEuler {
     ) -> Result<Solution, StepError> {
         let state = State { x: &body.x, v: &body.v };
         let weights = Weights { position: -dt * dt, velocity: -dt };
-        let options = LinearisationOptions { weights, curvature, stiffness_times_velocity: true };
+        let options = LinearisationOptions::new(weights, curvature).with_stiffness_times_velocity(true);
         let linear = body.system.linearise_with_masses(state, options, &body.masses, matrix)?;
         let rhs = |&vertex: &usize| -> Vector3<f64> {
             let (force, change) = (linear.force[vertex], linear.stiffness_times_velocity[vertex]);
@@ -94,13 +94,13 @@ impl ImplicitEuler {
     fn failure(&self, solution: &Solution, matrix: &BlockMatrix, free: &[usize]) -> StepError {
         let mut residual = vec![[0.0; 3]; free.len()];
         matrix.multiply(&solution.delta, &mut residual);
-        let size = |place: usize| {
-            let error: Vector3<f64> = std::array::from_fn(|axis| solution.rhs[place][axis] - residual[place][axis]);
+        let size = |row: usize| {
+            let error: Vector3<f64> = std::array::from_fn(|axis| solution.rhs[row][axis] - residual[row][axis]);
             // Rank NaN as the largest.
             let size = crate::geometry::norm(error);
             if size.is_nan() { f64::INFINITY } else { size }
         };
-        let worst = (0..free.len()).max_by(|&a, &b| size(a).total_cmp(&size(b))).map_or(0, |place| free[place]);
+        let worst = (0..free.len()).max_by(|&a, &b| size(a).total_cmp(&size(b))).map_or(0, |row| free[row]);
         let report = &solution.report;
         StepError::NotSolved {
             iterations: report.iterations,

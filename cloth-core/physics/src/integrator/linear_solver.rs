@@ -45,6 +45,7 @@ impl LinearSolverChoice {
 /// Numbers of linear systems solved, by solver.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
+#[non_exhaustive]
 pub struct SolvedBy {
     /// Solves by [`OverRelaxation`].
     pub over_relaxation: u64,
@@ -195,7 +196,7 @@ impl<T: Precision> LinearSolver<T> {
             }
         };
         if self.choice == LinearSolverChoice::Auto && !self.in_contact && report.converged() {
-            trial.note(report.iterations, options.relative_tolerance);
+            trial.record(report.iterations, options.relative_tolerance);
         }
         (report, solved_by)
     }

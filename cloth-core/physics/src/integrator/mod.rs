@@ -86,6 +86,7 @@ pub struct IntegratorMemory {
 
 /// The work that a step took.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct StepReport {
     /// Linear systems solved.
     pub solves: u64,
@@ -146,13 +147,13 @@ fn move_by(body: &mut Body, u: &[Vector3<f64>], dt: f64, velocities: &[Vector3<f
         std::array::from_fn(|axis| body.x[vertex][axis] + dt * u[axis])
     };
     let positions: Vec<Vector3<f64>> = free.iter().zip(u).map(moved).collect();
-    if let Some(place) = positions.iter().position(|p| p.iter().any(|coordinate| !coordinate.is_finite())) {
-        return Err(StepError::NonFinite { vertex: free[place], position: positions[place] });
+    if let Some(row) = positions.iter().position(|p| p.iter().any(|coordinate| !coordinate.is_finite())) {
+        return Err(StepError::NonFinite { vertex: free[row], position: positions[row] });
     }
     body.x = moved_by_velocities(body, dt);
-    for (place, &vertex) in body.system.dofs().free().iter().enumerate() {
-        body.x[vertex] = positions[place];
-        body.v[vertex] = velocities[place];
+    for (row, &vertex) in body.system.dofs().free().iter().enumerate() {
+        body.x[vertex] = positions[row];
+        body.v[vertex] = velocities[row];
     }
     Ok(())
 }

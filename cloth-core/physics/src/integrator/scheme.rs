@@ -74,6 +74,7 @@ impl Scheme {
 /// Convergence criteria of Newton's method. Keys that are not given keep the integrator's default.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
+#[non_exhaustive]
 pub struct Tolerances {
     /// A step converges once an iteration changes no velocity by more than this, in m/s. Default 1e-4 for `newton`,
     /// 1e-7 for schemes of second order.

@@ -36,7 +36,7 @@ fn largest_row_sum(body: &mut Body, weights: Weights) -> Result<f64, EvaluationE
     let mut matrix = body.system.matrix();
     let state = energy_solve::State { x: &body.x, v: &body.v };
     let curvature = Curvature::Exact;
-    let options = LinearisationOptions { weights, curvature, stiffness_times_velocity: false };
+    let options = LinearisationOptions::new(weights, curvature);
     body.system.linearise(state, options, &mut matrix)?;
     let free = body.system.dofs().free();
     let sums = matrix.absolute_row_sums();

@@ -43,7 +43,7 @@ impl Trial {
     }
 
     /// Records a solve by the solver in use, and decides which one comes next.
-    pub(super) fn note(&mut self, iterations: usize, relative_tolerance: f64) {
+    pub(super) fn record(&mut self, iterations: usize, relative_tolerance: f64) {
         // Sums of a damaged checkpoint may be any.
         self.count = self.count.saturating_add(1);
         self.iterations = self.iterations.saturating_add(iterations as u32);
@@ -92,7 +92,7 @@ mod tests {
         let mut by_multigrid = 0;
         for _ in 0..solutions {
             by_multigrid += usize::from(trial.multigrid());
-            trial.note(iterations(trial.multigrid()), 0.03);
+            trial.record(iterations(trial.multigrid()), 0.03);
         }
         by_multigrid
     }
@@ -126,7 +126,7 @@ mod tests {
         for solution in 0..300 {
             let digits = if solution % 7 < 3 { 1 } else { 2 };
             by_multigrid += usize::from(trial.multigrid());
-            trial.note(digits * if trial.multigrid() { 5 } else { 40 }, 0.1_f64.powi(digits as i32));
+            trial.record(digits * if trial.multigrid() { 5 } else { 40 }, 0.1_f64.powi(digits as i32));
         }
         assert!(by_multigrid > 280, "{by_multigrid}");
     }

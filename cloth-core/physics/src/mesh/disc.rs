@@ -39,8 +39,8 @@ impl Disc {
         for ring in 1..=self.rings {
             let radius = self.radius * ring as f64 / self.rings as f64;
             let around = 6 * ring;
-            let at = |place: usize| {
-                let (sine, cosine) = (TAU * place as f64 / around as f64).sin_cos();
+            let at = |step: usize| {
+                let (sine, cosine) = (TAU * step as f64 / around as f64).sin_cos();
                 [radius * cosine, radius * sine, 0.0]
             };
             vertices.extend((0..around).map(at));
@@ -56,6 +56,6 @@ impl Disc {
 }
 
 /// Returns the index of a vertex, given its ring and its position along the ring.
-fn vertex(ring: usize, place: usize) -> usize {
-    if ring == 0 { 0 } else { 1 + 3 * ring * (ring - 1) + place % (6 * ring) }
+fn vertex(ring: usize, step: usize) -> usize {
+    if ring == 0 { 0 } else { 1 + 3 * ring * (ring - 1) + step % (6 * ring) }
 }

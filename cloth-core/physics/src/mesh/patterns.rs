@@ -15,7 +15,7 @@ pub(super) struct Patterns {
     unscaled: Vec<[Vector3<f64>; 3]>,
 }
 
-/// The largest distance of two ends of an edge that count as the same place, over the length of the edge.
+/// The largest distance of two ends of an edge that count as the same position, over the length of the edge.
 const SAME_PLACE: f64 = 1e-6;
 
 impl Patterns {
@@ -101,8 +101,8 @@ impl TriangleMesh {
             [0, 1].map(|side| {
                 let triangle = hinge.triangles[side];
                 [hinge.vertices[side], hinge.vertices[2], hinge.vertices[3]].map(|vertex| {
-                    let place = self.triangles()[triangle].iter().position(|&corner| corner == vertex);
-                    of[triangle][place.unwrap_or(0)]
+                    let corner = self.triangles()[triangle].iter().position(|&corner| corner == vertex);
+                    of[triangle][corner.unwrap_or(0)]
                 })
             })
         };
@@ -114,6 +114,7 @@ impl TriangleMesh {
 /// A rest shape that cannot be scaled.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[expect(missing_docs, reason = "the messages name the fields")]
+#[non_exhaustive]
 pub enum ScaleError {
     /// A triangle has no warp direction.
     #[error(

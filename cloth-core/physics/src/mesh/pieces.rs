@@ -63,10 +63,10 @@ impl TriangleMesh {
 
     /// Returns the component with these vertices, and its springs.
     pub fn piece(&self, vertices: &[usize], springs: &SpringNetwork) -> (Self, SpringNetwork) {
-        let mut place = vec![usize::MAX; self.vertices().len()];
-        vertices.iter().enumerate().for_each(|(number, &vertex)| place[vertex] = number);
+        let mut new_numbers = vec![usize::MAX; self.vertices().len()];
+        vertices.iter().enumerate().for_each(|(number, &vertex)| new_numbers[vertex] = number);
         let renumbered = |pairs: &[[usize; 2]]| -> Vec<[usize; 2]> {
-            let moved = pairs.iter().map(|pair| pair.map(|vertex| place[vertex]));
+            let moved = pairs.iter().map(|pair| pair.map(|vertex| new_numbers[vertex]));
             moved.filter(|pair| !pair.contains(&usize::MAX)).collect()
         };
         let springs = SpringNetwork {
@@ -74,9 +74,9 @@ impl TriangleMesh {
             shear: renumbered(&springs.shear),
             bending: renumbered(&springs.bending),
         };
-        let is_inside = |corners: &[usize; 3]| place[corners[0]] != usize::MAX;
+        let is_inside = |corners: &[usize; 3]| new_numbers[corners[0]] != usize::MAX;
         let inside = self.triangles().iter().filter(|corners| is_inside(corners));
-        let triangles = inside.map(|corners| corners.map(|corner| place[corner])).collect();
+        let triangles = inside.map(|corners| corners.map(|corner| new_numbers[corner])).collect();
         let warps = self.warps().map(|warps| {
             let inside = self.triangles().iter().zip(warps).filter(|(corners, _)| is_inside(corners));
             inside.map(|(_, warp)| *warp).collect()

@@ -66,6 +66,7 @@ pub struct Pleats {
 /// Pleats that need more cloth than there is.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[error("{count} pleats of depth {depth} m need more cloth than {width} m; make them fewer or shallower")]
+#[non_exhaustive]
 pub struct PleatsError {
     count: f64,
     depth: f64,

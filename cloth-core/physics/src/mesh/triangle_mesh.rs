@@ -9,6 +9,7 @@ const SHOWN: usize = 5;
 /// Why vertices and triangles do not form a valid mesh. Indices start from 0.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[expect(missing_docs, reason = "the messages name the fields")]
+#[non_exhaustive]
 pub enum MeshError {
     /// The mesh has no triangles.
     #[error("the mesh has {vertices} vertices and {triangles} triangles; at least one triangle is needed")]
@@ -121,7 +122,7 @@ impl TriangleMesh {
         Self { vertices: self.vertices.iter().map(|&vertex| pose.transform(vertex)).collect(), ..self }
     }
 
-    /// Returns the mesh with its vertices at other places, in m.
+    /// Returns the mesh with its vertices at other positions, in m.
     pub(crate) fn with_vertices(self, vertices: Vec<Vector3<f64>>) -> Self {
         Self { vertices, ..self }
     }

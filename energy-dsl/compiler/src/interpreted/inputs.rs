@@ -61,6 +61,7 @@ impl InputNumbers {
 
 /// Numbers that cannot be bound to elements.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum BindError {
     /// More or fewer columns than inputs.
     Columns {

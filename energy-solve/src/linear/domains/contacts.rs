@@ -29,7 +29,7 @@ pub(crate) struct DomainContacts<T> {
 struct ScaledFactor<T> {
     /// g of each vertex; zero for a pinned one.
     vectors: [Wide<T>; 4],
-    /// The domain of each vertex, and its place among the rows that the domain publishes.
+    /// The domain of each vertex, and its number among the rows that the domain publishes.
     sources: [[u32; 2]; 4],
     /// The row of each vertex in this domain, or [`ELSEWHERE`].
     targets: [u32; 4],
@@ -93,14 +93,14 @@ fn scaled_factors<T: Precision>(
         for root in factors(contact) {
             let mut scaled_factor = ScaledFactor {
                 vectors: [[T::from_f64(0.0); 4]; 4],
-                sources: [[first.home.domain, first.home.place]; 4],
+                sources: [[first.home.domain, first.home.published]; 4],
                 targets: [ELSEWHERE; 4],
             };
             for (number, &Vertex { row, weight, home }) in vertices.iter().enumerate() {
                 let root: Vector3<f64> = root.map(|component| weight * component);
                 let [u, v, w] = scaled(&inverses[row], &root).map(T::from_f64);
                 scaled_factor.vectors[number] = [u, v, w, T::from_f64(0.0)];
-                scaled_factor.sources[number] = [home.domain, home.place];
+                scaled_factor.sources[number] = [home.domain, home.published];
             }
             for (number, Vertex { home: Home { domain, .. }, .. }) in vertices.iter().enumerate() {
                 let is_first = vertices[..number].iter().all(|before| before.home.domain != *domain);
@@ -124,14 +124,14 @@ struct Vertex {
     home: Home,
 }
 
-/// The place of a row.
+/// The location of a row.
 #[derive(Clone, Copy, Default)]
 struct Home {
     domain: u32,
     /// Its number within the domain.
     row: u32,
-    /// Its place among the rows that the domain publishes.
-    place: u32,
+    /// Its number among the rows that the domain publishes.
+    published: u32,
 }
 
 /// Returns the rows of each domain that contacts act on, and the home of each such row.
@@ -144,7 +144,7 @@ fn published<T>(contacts: &[Contact], ranges: &[Range<usize>]) -> (Vec<DomainCon
         let mut rows = Vec::new();
         for row in range.clone().filter(|&row| is_touched[row]) {
             let own = index(row - range.start);
-            homes[row] = Home { domain: index(domain), row: own, place: index(rows.len()) };
+            homes[row] = Home { domain: index(domain), row: own, published: index(rows.len()) };
             rows.push(own);
         }
         all.push(DomainContacts { rows, factors: Vec::new() });
@@ -163,8 +163,8 @@ impl<T: Precision> DomainContacts<T> {
     pub(crate) fn publish(&self, vector: &[Wide<T>], border: Option<&RwLock<Vec<Wide<T>>>>) {
         if let (Some(border), false) = (border, self.rows.is_empty()) {
             let mut published = border.write().expect("no other thread panicked");
-            for (place, &row) in published.iter_mut().zip(&self.rows) {
-                *place = vector[row as usize];
+            for (target, &row) in published.iter_mut().zip(&self.rows) {
+                *target = vector[row as usize];
             }
         }
     }
@@ -180,8 +180,8 @@ impl<T: Precision> DomainContacts<T> {
             let mut own = [T::from_f64(0.0); 4];
             let mut sum = T::from_f64(0.0);
             for vertex in 0..4 {
-                let [domain, place] = sources[vertex];
-                let (g, t) = (&vectors[vertex], &t[domain as usize][place as usize]);
+                let [domain, row] = sources[vertex];
+                let (g, t) = (&vectors[vertex], &t[domain as usize][row as usize]);
                 let product = g[0].mul_add::<L>(t[0], g[1].mul_add::<L>(t[1], g[2] * t[2]));
                 own[vertex] = product;
                 sum = sum + product;

@@ -25,7 +25,7 @@ pub(crate) struct Coupling<T> {
     other: u32,
     border: u32,
     /// The index of the block in the matrix, and its row and column there.
-    place: u32,
+    slot: u32,
     between: [u32; 2],
     /// Whether the transpose of the stored block acts.
     transposed: bool,
@@ -47,8 +47,8 @@ impl<T: Precision> Couplings<T> {
             domain.border.sort_unstable();
             domain.border.dedup();
         }
-        for (place, between) in outer {
-            couple(&mut all, ranges, place, between);
+        for (slot, between) in outer {
+            couple(&mut all, ranges, slot, between);
         }
         for domain in &mut all {
             domain.couplings.sort_by_key(|coupling| coupling.other);
@@ -65,11 +65,11 @@ impl<T: Precision> Couplings<T> {
     pub(crate) fn absolute_row_sums(&self, matrix: &BlockMatrix<impl Precision>) -> Vec<Vector3<f64>> {
         let mut sums = vec![[0.0; 3]; self.border.len()];
         for coupling in &self.couplings {
-            let place = self.border.binary_search(&coupling.row).expect("coupled rows are on the border");
-            let block = doubled(&matrix.values()[coupling.place as usize]);
+            let border = self.border.binary_search(&coupling.row).expect("coupled rows are on the border");
+            let block = doubled(&matrix.values()[coupling.slot as usize]);
             for i in 0..3 {
                 for j in 0..3 {
-                    sums[place][i] += if coupling.transposed { block[j][i].abs() } else { block[i][j].abs() };
+                    sums[border][i] += if coupling.transposed { block[j][i].abs() } else { block[i][j].abs() };
                 }
             }
         }
@@ -81,7 +81,7 @@ impl<T: Precision> Couplings<T> {
     pub(crate) fn scale<M: Precision, L: Level>(&mut self, inverses: &[InverseFactor<T>], matrix: &BlockMatrix<M>) {
         for coupling in &mut self.couplings {
             let [row, column] = coupling.between.map(|row| rounded(&inverses[row as usize]));
-            let block = scaled_block::<M, L>(&row, &matrix.values()[coupling.place as usize], &column);
+            let block = scaled_block::<M, L>(&row, &matrix.values()[coupling.slot as usize], &column);
             for i in 0..3 {
                 for j in 0..3 {
                     let entry = if coupling.transposed { block[j][i] } else { block[i][j] };
@@ -96,8 +96,8 @@ impl<T: Precision> Couplings<T> {
     pub(crate) fn publish(&self, vector: &[Wide<T>], border: &RwLock<Vec<Wide<T>>>) {
         if !self.border.is_empty() {
             let mut published = border.write().expect("no other thread panicked");
-            for (place, &row) in published.iter_mut().zip(&self.border) {
-                *place = vector[row as usize];
+            for (target, &row) in published.iter_mut().zip(&self.border) {
+                *target = vector[row as usize];
             }
         }
     }
@@ -124,12 +124,11 @@ impl<T: Precision> Couplings<T> {
 
 /// Returns the index, row and column of each block that couples two domains.
 fn outer_blocks<T>(pattern: &Pattern, triangles: &[Triangle<T>]) -> Vec<(usize, [usize; 2])> {
-    let of_row =
-        |row: usize, inner_end: u32| (inner_end as usize..pattern.above(row).end).map(move |place| (row, place));
-    let places = triangles.iter().flat_map(|domain| {
+    let of_row = |row: usize, inner_end: u32| (inner_end as usize..pattern.above(row).end).map(move |slot| (row, slot));
+    let blocks = triangles.iter().flat_map(|domain| {
         domain.rows.clone().zip(&domain.inner_end).flat_map(move |(row, &inner_end)| of_row(row, inner_end))
     });
-    places.map(|(row, place)| (place, [row, pattern.columns()[place] as usize])).collect()
+    blocks.map(|(row, slot)| (slot, [row, pattern.columns()[slot] as usize])).collect()
 }
 
 /// Returns the domain of a row and the index of the row within it.
@@ -139,7 +138,7 @@ fn local(ranges: &[Range<usize>], row: usize) -> (usize, u32) {
 }
 
 /// Adds the block between two domains to both.
-fn couple<T: Precision>(all: &mut [Couplings<T>], ranges: &[Range<usize>], place: usize, between: [usize; 2]) {
+fn couple<T: Precision>(all: &mut [Couplings<T>], ranges: &[Range<usize>], slot: usize, between: [usize; 2]) {
     let ends = between.map(|row| local(ranges, row));
     for (own, with, transposed) in [(ends[0], ends[1], false), (ends[1], ends[0], true)] {
         let border = all[with.0].border.binary_search(&with.1).expect("coupled rows are on the border");
@@ -147,7 +146,7 @@ fn couple<T: Precision>(all: &mut [Couplings<T>], ranges: &[Range<usize>], place
             row: own.1,
             other: index(with.0),
             border: index(border),
-            place: index(place),
+            slot: index(slot),
             between: between.map(index),
             transposed,
             columns: [[T::from_f64(0.0); 4]; 3],

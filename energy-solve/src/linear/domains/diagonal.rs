@@ -66,25 +66,25 @@ pub(crate) fn invert<T: Precision, M: Precision, L: Level>(
                 add_scaled_block(&mut block, 1.0, added);
             }
             let [[a, ..], [b, c, _], [d, e, f]] = block;
-            for (place, number) in [a, b, c, d, e, f].into_iter().enumerate() {
-                numbers[place][lane] = number;
+            for (entry, number) in [a, b, c, d, e, f].into_iter().enumerate() {
+                numbers[entry][lane] = number;
             }
         }
         let mut triangle = [L::F64::splat(0.0); 6];
-        for place in 0..6 {
-            triangle[place] = L::F64::load(&numbers[place]);
+        for entry in 0..6 {
+            triangle[entry] = L::F64::load(&numbers[entry]);
         }
         let (triangle, definite) = inverse_factors(triangle, relaxation);
         if !definite.all() {
             return Err(row + (0..lanes).find(|&lane| !definite.lane(lane)).unwrap_or(0));
         }
-        for place in 0..6 {
-            triangle[place].store(&mut numbers[place]);
+        for entry in 0..6 {
+            triangle[entry].store(&mut numbers[entry]);
         }
         for lane in 0..inverses.len() {
             let mut rows = [0.0; 6];
-            for place in 0..6 {
-                rows[place] = numbers[place][lane];
+            for entry in 0..6 {
+                rows[entry] = numbers[entry][lane];
             }
             inverses[lane] = by_columns(rows);
         }

@@ -84,7 +84,7 @@ impl<T: Precision> Triangle<T> {
 
     /// Returns the indices, in the pattern, of the blocks that couple a row with later rows of the domain.
     #[inline(always)]
-    fn places(&self, pattern: &Pattern, local: usize) -> Range<usize> {
+    fn slots(&self, pattern: &Pattern, local: usize) -> Range<usize> {
         pattern.above(self.rows.start + local).start..self.inner_end[local] as usize
     }
 
@@ -108,9 +108,9 @@ impl<T: Precision> Triangle<T> {
         for (local, row) in self.rows.clone().enumerate() {
             let own = rounded(&inverses[row]);
             let mut first = 9 * (pattern.diagonal(row) - row - self.blocks_before);
-            for place in self.places(pattern, local) {
-                let other = rounded(&inverses[pattern.columns()[place] as usize]);
-                let rows = scaled_block::<M, L>(&own, &values[place], &other);
+            for slot in self.slots(pattern, local) {
+                let other = rounded(&inverses[pattern.columns()[slot] as usize]);
+                let rows = scaled_block::<M, L>(&own, &values[slot], &other);
                 store(&mut self.numbers[first..][..10], &rows);
                 first += 9;
             }
@@ -146,9 +146,9 @@ pub(crate) fn scaled_block<M: Precision, L: Level>(p: &[Wide<M>; 3], b: &Block<M
 #[inline(always)]
 fn store<T: Precision, M: Precision>(numbers: &mut [T], rows: &[Wide<M>; 3]) {
     for row in 0..3 {
-        let place = &mut numbers[3 * row..3 * row + 4];
+        let target = &mut numbers[3 * row..3 * row + 4];
         for lane in 0..4 {
-            place[lane] = T::from_f64(rows[row][lane].into());
+            target[lane] = T::from_f64(rows[row][lane].into());
         }
     }
 }

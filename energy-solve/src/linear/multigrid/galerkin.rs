@@ -61,9 +61,9 @@ impl GalerkinProduct {
         let upper = of_rows(0..fine.rows()).map(|(row, column)| (row.min(column), row.max(column)));
         let coarse = Pattern::from_pairs(Storage::Upper, interpolation.aggregates(), upper);
         let half = |(row, column): (u32, u32)| {
-            let (place, transposed) =
-                coarse.place(row as usize, column as usize).expect("the pattern contains every product");
-            index(2 * place + usize::from(transposed))
+            let (slot, transposed) =
+                coarse.slot(row as usize, column as usize).expect("the pattern contains every product");
+            index(2 * slot + usize::from(transposed))
         };
         let mut halves = Vec::with_capacity(of_rows(0..fine.rows()).count());
         let part = |rows: &Range<usize>| {
@@ -164,7 +164,7 @@ impl<T: Precision, M: Precision> Kernel for Contribution<'_, T, M> {
         let (pattern, values) = (fine.pattern(), fine.values().as_flattened().as_flattened().as_chunks::<9>().0);
         let mut sums = vec![[0.0; 9]; part.touched.len()];
         let mut row_of_product: Vec<Half> = Vec::new();
-        let (mut slot, mut place) = (part.first_slot, part.first_half);
+        let (mut slot, mut half_number) = (part.first_slot, part.first_half);
         for row in part.rows.clone() {
             row_of_product.clear();
             row_of_product.resize(product.sums[row] as usize, [0.0; 9]);
@@ -183,9 +183,9 @@ impl<T: Precision, M: Precision> Kernel for Contribution<'_, T, M> {
             }
             for &weight in interpolation.weights(row) {
                 for block in &row_of_product {
-                    let half = product.halves[place] as usize - part.touched.start;
+                    let half = product.halves[half_number] as usize - part.touched.start;
                     add_times::<f64, L>(&mut sums[half], weight.into(), block);
-                    place += 1;
+                    half_number += 1;
                 }
             }
         }
@@ -236,7 +236,7 @@ mod tests {
         let interpolation = Interpolation::<f64>::averaged(&pattern);
         let p = DMatrix::from_fn(3 * pattern.rows(), 3 * interpolation.aggregates(), |i, j| {
             let carries = interpolation.columns(i / 3).iter().position(|&aggregate| aggregate as usize == j / 3);
-            carries.map_or(0.0, |place| if i % 3 == j % 3 { interpolation.weights(i / 3)[place] } else { 0.0 })
+            carries.map_or(0.0, |entry| if i % 3 == j % 3 { interpolation.weights(i / 3)[entry] } else { 0.0 })
         });
         let expected = p.transpose() * dense(&fine) * &p;
         for bounds in [[0, 122].as_slice(), &[0, 50, 80, 122]] {

@@ -264,10 +264,10 @@ impl<T: Precision> Kernel for PublishCorrection<'_, T> {
     #[inline(always)]
     fn run<L: Level>(self) {
         let Self { smoother, coarse, border } = self;
-        for (place, &local) in smoother.couplings.border().iter().enumerate() {
+        for (number, &local) in smoother.couplings.border().iter().enumerate() {
             let row = smoother.triangle.rows.start + local as usize;
             let prolonged = coarse.interpolation.prolonged::<L>(row, &coarse.correction);
-            border[place] = smoother.scaled(local as usize, &prolonged);
+            border[number] = smoother.scaled(local as usize, &prolonged);
         }
     }
 }

@@ -72,20 +72,20 @@ impl<T: Precision> Interpolation<T> {
 
     /// Returns the indices of a row's weights.
     #[inline(always)]
-    pub(super) fn places(&self, row: usize) -> Range<usize> {
+    pub(super) fn entries(&self, row: usize) -> Range<usize> {
         self.row_start[row] as usize..self.row_start[row + 1] as usize
     }
 
     /// Returns the aggregates from which a row is interpolated.
     #[inline(always)]
     pub(super) fn columns(&self, row: usize) -> &[u32] {
-        &self.columns[self.places(row)]
+        &self.columns[self.entries(row)]
     }
 
     /// Returns the weights of these aggregates.
     #[inline(always)]
     pub(super) fn weights(&self, row: usize) -> &[T] {
-        &self.weights[self.places(row)]
+        &self.weights[self.entries(row)]
     }
 
     /// Returns the range of aggregates from which these rows are interpolated.
@@ -101,8 +101,8 @@ impl<T: Precision> Interpolation<T> {
     #[inline(always)]
     pub(super) fn prolonged<L: Level>(&self, row: usize, e: &[Wide<T>]) -> Wide<T> {
         let mut sum = [T::from_f64(0.0); 4];
-        for place in self.places(row) {
-            let (weight, from) = (self.weights[place], e[self.columns[place] as usize]);
+        for entry in self.entries(row) {
+            let (weight, from) = (self.weights[entry], e[self.columns[entry] as usize]);
             for lane in 0..4 {
                 sum[lane] = from[lane].mul_add::<L>(weight, sum[lane]);
             }
@@ -113,8 +113,8 @@ impl<T: Precision> Interpolation<T> {
     /// Adds a row's contribution to Pᵀ r; `sums` begins with the aggregate `first`.
     #[inline(always)]
     pub(super) fn add_restricted<L: Level>(&self, row: usize, r: &Wide<T>, first: usize, sums: &mut [Wide<T>]) {
-        for place in self.places(row) {
-            let (weight, to) = (self.weights[place], &mut sums[self.columns[place] as usize - first]);
+        for entry in self.entries(row) {
+            let (weight, to) = (self.weights[entry], &mut sums[self.columns[entry] as usize - first]);
             let mut sum = *to;
             for lane in 0..4 {
                 sum[lane] = r[lane].mul_add::<L>(weight, sum[lane]);
@@ -136,18 +136,18 @@ struct Neighbours {
 impl Neighbours {
     fn of(pattern: &Pattern) -> Self {
         let rows = pattern.rows();
-        let couplings = || (0..rows).flat_map(|row| pattern.above(row).map(move |place| (row, place)));
+        let couplings = || (0..rows).flat_map(|row| pattern.above(row).map(move |entry| (row, entry)));
         let mut start = vec![0; rows + 1];
-        for (row, place) in couplings() {
+        for (row, entry) in couplings() {
             start[row + 1] += 1;
-            start[pattern.columns()[place] as usize + 1] += 1;
+            start[pattern.columns()[entry] as usize + 1] += 1;
         }
         for row in 0..rows {
             start[row + 1] += start[row];
         }
         let (mut next, mut neighbours) = (start.clone(), vec![0; start[rows]]);
-        for (row, place) in couplings() {
-            let column = pattern.columns()[place] as usize;
+        for (row, entry) in couplings() {
+            let column = pattern.columns()[entry] as usize;
             for (of, other) in [(row, column), (column, row)] {
                 neighbours[next[of]] = index(other);
                 next[of] += 1;

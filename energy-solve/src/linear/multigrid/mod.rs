@@ -65,8 +65,8 @@ const ROUGHNESS: f64 = 2.0;
 ///         matrix.diagonal_mut(vertex)[axis][axis] += 0.01;
 ///     }
 ///     for &[a, b] in &springs {
-///         let (place, _) = pattern.place(a as usize, b as usize).unwrap();
-///         matrix.values_mut()[place][axis][axis] = -1.0;
+///         let (slot, _) = pattern.slot(a as usize, b as usize).unwrap();
+///         matrix.values_mut()[slot][axis][axis] = -1.0;
 ///         matrix.diagonal_mut(a as usize)[axis][axis] += 1.0;
 ///         matrix.diagonal_mut(b as usize)[axis][axis] += 1.0;
 ///     }

@@ -51,10 +51,10 @@ impl<T: Precision> Smoother<T> {
         let first = self.triangle.rows.start;
         invert::<T, M, L>(matrix, &[], self.triangle.rows.clone(), RELAXATION, inverses)?;
         let sums = self.couplings.absolute_row_sums(matrix);
-        for (place, &local) in self.couplings.border().iter().enumerate() {
+        for (number, &local) in self.couplings.border().iter().enumerate() {
             let (mut diagonal, mut more) = (relaxed(&doubled(matrix.diagonal(first + local as usize))), [[0.0; 3]; 3]);
             for i in 0..3 {
-                more[i][i] = 0.5 * sums[place][i];
+                more[i][i] = 0.5 * sums[number][i];
                 diagonal[i][i] += more[i][i];
             }
             let inverse = inverse_factor(&diagonal).ok_or(first + local as usize)?;
@@ -62,7 +62,7 @@ impl<T: Precision> Smoother<T> {
             let more: [Wide<f64>; 3] = scaled_block::<f64, L>(&rows, &more, &rows);
             for i in 0..3 {
                 for j in 0..3 {
-                    self.strengthened[place][j][i] = T::from_f64(RELAXATION * more[i][j]);
+                    self.strengthened[number][j][i] = T::from_f64(RELAXATION * more[i][j]);
                 }
             }
             inverses[local as usize] = rounded(&inverse);
@@ -72,8 +72,8 @@ impl<T: Precision> Smoother<T> {
             let [a, c, f] = [1.0 / x, 1.0 / y, 1.0 / z];
             let (b, e) = (-yx * a * c, -zy * c * f);
             let d = -(zx * a + zy * b) * f;
-            for (place, entry) in [a, b, c, d, e, f].into_iter().enumerate() {
-                self.factors[local][place] = T::from_f64(unit * entry);
+            for (number, entry) in [a, b, c, d, e, f].into_iter().enumerate() {
+                self.factors[local][number] = T::from_f64(unit * entry);
             }
         }
         Ok(())

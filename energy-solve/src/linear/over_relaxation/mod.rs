@@ -39,7 +39,7 @@ const RELAXATION: f64 = 1.6;
 /// between them, Ẽ, enter the operator: p + (ω − 2) t + Ẽ t. The domains depend on the matrix alone, and sums run over
 /// them in order, so the solution is bit-identical for any number of threads.
 ///
-/// Contacts have no place in the pattern. Their diagonal blocks are added to D, and their other blocks to Ẽ; see
+/// Contacts have no slots in the pattern. Their diagonal blocks are added to D, and their other blocks to Ẽ; see
 /// [`OverRelaxation::scale_with_contacts`].
 ///
 /// [`OverRelaxation::scale`] reuses everything that depends on the pattern alone.

@@ -28,13 +28,13 @@ pub(crate) struct SparseFactor {
     /// First entry of each supernode's panel, and the end of the last.
     starts: Vec<usize>,
     /// Place of each block of the matrix.
-    places: Vec<BlockPlace>,
+    slots: Vec<PanelSlot>,
     entries: Vec<f64>,
 }
 
-/// The place of a matrix block in the panels: entry (i, j) is at `start + i · row + j · column`.
+/// The slot of a matrix block in the panels: entry (i, j) is at `start + i · row + j · column`.
 #[derive(Clone, Copy)]
-struct BlockPlace {
+struct PanelSlot {
     start: usize,
     row: usize,
     column: usize,
@@ -74,7 +74,7 @@ impl SparseFactor {
         let mut entries = Vec::new();
         entries.try_reserve_exact(starts[supernodes.len()]).map_err(|_| OutOfMemory)?;
         entries.resize(starts[supernodes.len()], 0.0);
-        let place = |row: usize, column: usize| {
+        let slot = |row: usize, column: usize| {
             let (from, to) = (positions[row].min(positions[column]), positions[row].max(positions[column]));
             let Supernode { columns, rows } = &supernodes[owners[from]];
             let stride = size * rows.len();
@@ -82,11 +82,11 @@ impl SparseFactor {
             let start = starts[owners[from]] + size * (at + (from - columns.start) * stride);
             // The panel has the lower triangle: a block of the upper one is transposed.
             let (row, column) = if positions[row] == to && from != to { (1, stride) } else { (stride, 1) };
-            BlockPlace { start, row, column }
+            PanelSlot { start, row, column }
         };
         let blocks = (0..pattern.rows()).flat_map(|row| pattern.row(row).map(move |(_, column)| (row, column)));
-        let places = blocks.map(|(row, column)| place(row, column)).collect();
-        Ok(Self { size, positions, owners, starts, places, entries, supernodes })
+        let slots = blocks.map(|(row, column)| slot(row, column)).collect();
+        Ok(Self { size, positions, owners, starts, slots, entries, supernodes })
     }
 
     /// Returns the number of stored entries of the factor.
@@ -103,12 +103,12 @@ impl SparseFactor {
     ) -> Result<(), NotPositiveDefinite> {
         self.fill(damping, entry);
         let mut waiting = Waiting::new(&self.supernodes);
-        let mut row_places = vec![0; self.positions.len()];
+        let mut panel_rows = vec![0; self.positions.len()];
         let mut product = Product::default();
         for index in 0..self.supernodes.len() {
             let supernode = &self.supernodes[index];
-            for (place, &row) in supernode.rows.iter().enumerate() {
-                row_places[row] = place;
+            for (number, &row) in supernode.rows.iter().enumerate() {
+                panel_rows[row] = number;
             }
             let (earlier, panel) = self.entries[..self.starts[index + 1]].split_at_mut(self.starts[index]);
             let mut panel = PanelMut::new(panel, self.size, supernode);
@@ -116,7 +116,7 @@ impl SparseFactor {
                 let rows = &self.supernodes[source].rows;
                 let to = from + rows[from..].partition_point(|&row| row < supernode.columns.end);
                 let source_panel = Panel::new(&earlier[self.starts[source]..], self.size, &self.supernodes[source]);
-                panel.subtract_product(&source_panel, from..to, &rows[from..], &row_places, &mut product);
+                panel.subtract_product(&source_panel, from..to, &rows[from..], &panel_rows, &mut product);
                 waiting.put(source, to, rows, &self.owners);
             }
             panel.factor().ok_or(NotPositiveDefinite)?;
@@ -128,10 +128,10 @@ impl SparseFactor {
     /// Copies the matrix to the panels and adds the damping to its diagonal.
     fn fill(&mut self, damping: f64, entry: impl Fn(usize, usize, usize) -> f64) {
         self.entries.fill(0.0);
-        for (block, place) in self.places.iter().enumerate() {
+        for (block, slot) in self.slots.iter().enumerate() {
             for i in 0..self.size {
                 for j in 0..self.size {
-                    self.entries[place.start + i * place.row + j * place.column] = entry(block, i, j);
+                    self.entries[slot.start + i * slot.row + j * slot.column] = entry(block, i, j);
                 }
             }
         }

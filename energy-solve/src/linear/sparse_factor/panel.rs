@@ -94,21 +94,21 @@ impl<'a> PanelMut<'a> {
     }
 
     /// Subtracts the contribution of an earlier panel S: its rows `columns` are columns of this panel, and S_r S_cᵀ is
-    /// subtracted for its rows r from `columns.start` on. `rows` has the positions of these rows, and `row_places` the
-    /// place of each position in this panel.
+    /// subtracted for its rows r from `columns.start` on. `rows` has the positions of these rows, and `panel_rows` the
+    /// row of each position in this panel.
     pub fn subtract_product(
         &mut self,
         source: &Panel<'_>,
         columns: Range<usize>,
         rows: &[usize],
-        row_places: &[usize],
+        panel_rows: &[usize],
         product: &mut Product,
     ) {
         let size = self.size;
         let (height, width, depth) = (size * rows.len(), size * columns.len(), source.columns());
         let (left, stride) = (&source.entries[size * columns.start..], source.rows());
-        let first = row_places[rows[0]];
-        let last = row_places[rows[rows.len() - 1]];
+        let first = panel_rows[rows[0]];
+        let last = panel_rows[rows[rows.len() - 1]];
         if last - first + 1 == rows.len() {
             let target = &mut self.entries[size * (first + first * self.rows)..];
             subtract_outer(target, self.rows, left, stride, [height, width, depth]);
@@ -118,10 +118,10 @@ impl<'a> PanelMut<'a> {
         product.0.resize(height * width, 0.0);
         subtract_outer(&mut product.0, height, left, stride, [height, width, depth]);
         for (at, column) in product.0.chunks_exact(height).enumerate() {
-            let place = size * row_places[rows[at / size]] + at % size;
-            let target = &mut self.entries[place * self.rows..][..self.rows];
+            let target_column = size * panel_rows[rows[at / size]] + at % size;
+            let target = &mut self.entries[target_column * self.rows..][..self.rows];
             for (part, row) in column.chunks_exact(size).zip(rows) {
-                add_multiple(&mut target[size * row_places[*row]..], 1.0, part);
+                add_multiple(&mut target[size * panel_rows[*row]..], 1.0, part);
             }
         }
     }
@@ -237,9 +237,9 @@ impl OuterProduct<'_> {
         for (column, sums) in sums.into_iter().enumerate() {
             let target = &mut target[(first + column) * *target_stride..][..*height];
             for (register, sum) in sums.into_iter().enumerate() {
-                let place = row + register * L::F64::LANES;
-                if place < *height {
-                    (L::F64::load_ragged(&target[place..]) - sum).store_ragged(&mut target[place..]);
+                let target_row = row + register * L::F64::LANES;
+                if target_row < *height {
+                    (L::F64::load_ragged(&target[target_row..]) - sum).store_ragged(&mut target[target_row..]);
                 }
             }
         }

@@ -103,7 +103,7 @@ impl Projection<'_> {
         Indefinite { projection: self, open, numbers }.change(L::NAME)
     }
 
-    /// Projects the Hessians of some elements, as many at a time as there are lanes. `first` returns the place of an
+    /// Projects the Hessians of some elements, as many at a time as there are lanes. `first` returns the number of an
     /// element's first number; its others follow at a `stride`: first those of the upper triangle, then those of the
     /// vectors. Calls `changed` for each element that was changed.
     pub(crate) fn change_some<L: Level>(

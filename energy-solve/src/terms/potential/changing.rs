@@ -9,8 +9,8 @@ use crate::matrix::pattern::Pattern;
 use crate::terms::active::Active;
 use crate::terms::counts::Tally;
 use crate::terms::linearisation::Linearisation;
-use crate::terms::places::BlockPlaces;
 use crate::terms::restriction::Restriction;
+use crate::terms::scatter_map::ScatterMaps;
 use crate::terms::share::{Divisible, Share};
 use crate::terms::state::{State, StepStart};
 use crate::terms::term::{MadeFromTerm, PlacedTerm, Quantity, TermDescription};
@@ -20,7 +20,7 @@ pub(super) trait Changing: TermDescription + Sync + 'static {
     /// The packed elements.
     type Packs: Evaluated;
     /// Packs the active elements at a time, in s.
-    fn pack(&mut self, time: f64, active: &Active, places: &BlockPlaces) -> PlacedPotentialTerm<Self::Packs>;
+    fn pack(&mut self, time: f64, active: &Active, maps: &ScatterMaps) -> PlacedPotentialTerm<Self::Packs>;
     /// Whether elements differ between two times, in s, or from those that were packed.
     fn varies(&self, from: f64, to: f64) -> bool;
     /// Advances the history at the end of a step. Returns whether an element changed.
@@ -40,7 +40,7 @@ pub(super) trait Changing: TermDescription + Sync + 'static {
 pub(super) struct PlacedChangingTerm<T: Changing> {
     term: T,
     active: Active,
-    places: BlockPlaces,
+    maps: ScatterMaps,
     shares: Vec<Share>,
     /// The elements at [`PlacedChangingTerm::time`].
     now: PlacedPotentialTerm<T::Packs>,
@@ -53,16 +53,16 @@ impl<T: Changing> PlacedChangingTerm<T> {
     /// Packs the elements of time 0.
     pub(super) fn new(mut term: T, dofs: &DofMap, pattern: &Pattern) -> Self {
         let active = Active::new(term.stencils(), dofs);
-        let places = match term.character().curved {
-            true => BlockPlaces::new(&active, term.stencils(), dofs, pattern),
-            false => BlockPlaces::default(),
+        let maps = match term.character().curved {
+            true => ScatterMaps::new(&active, term.stencils(), dofs, pattern),
+            false => ScatterMaps::default(),
         };
-        let now = term.pack(0.0, &active, &places);
-        Self { term, active, places, shares: Vec::new(), now, time: 0.0, is_stale: false }
+        let now = term.pack(0.0, &active, &maps);
+        Self { term, active, maps, shares: Vec::new(), now, time: 0.0, is_stale: false }
     }
 
     fn renew(&mut self, time: f64) {
-        self.now = self.term.pack(time, &self.active, &self.places);
+        self.now = self.term.pack(time, &self.active, &self.maps);
         self.now.divide(&self.shares);
         (self.time, self.is_stale) = (time, false);
     }

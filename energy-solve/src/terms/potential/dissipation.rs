@@ -13,8 +13,8 @@ use crate::terms::active::Active;
 use crate::terms::counts::Tally;
 use crate::terms::curvature::Curvature;
 use crate::terms::linearisation::{Linearisation, Weights};
-use crate::terms::places::BlockPlaces;
 use crate::terms::restriction::Restriction;
+use crate::terms::scatter_map::ScatterMaps;
 use crate::terms::share::{Divisible, Share};
 use crate::terms::state::{State, StepStart};
 use crate::terms::stencils::Stencils;
@@ -71,11 +71,11 @@ impl<L: DissipationLaw> TermDescription for DissipationTerm<L> {
 impl<L: DissipationLaw + 'static> Term for DissipationTerm<L> {
     fn place(self: Box<Self>, dofs: &DofMap, pattern: &Pattern) -> Box<dyn PlacedTerm> {
         let stencils = self.stencils();
-        let is_free = |vertex: u32| dofs.place(vertex as usize).is_some();
+        let is_free = |vertex: u32| dofs.row(vertex as usize).is_some();
         let is_free = stencils.iter().map(|mut stencil| stencil.any(is_free)).collect();
-        let places = BlockPlaces::of_all(stencils, dofs, pattern);
-        let acting = acting::<L>(Vec::new(), &self, &places);
-        Box::new(PlacedDissipationTerm { term: self.into(), is_free, places, shares: Vec::new(), acting })
+        let maps = ScatterMaps::of_all(stencils, dofs, pattern);
+        let acting = acting::<L>(Vec::new(), &self, &maps);
+        Box::new(PlacedDissipationTerm { term: self.into(), is_free, maps, shares: Vec::new(), acting })
     }
 }
 
@@ -85,8 +85,8 @@ struct PlacedDissipationTerm<L: DissipationLaw> {
     term: Arc<DissipationTerm<L>>,
     /// Whether each stencil has a free vertex.
     is_free: Vec<bool>,
-    /// Places of the blocks of all stencils.
-    places: BlockPlaces,
+    /// ScatterMap of the blocks of all stencils.
+    maps: ScatterMaps,
     shares: Vec<Share>,
     /// The elements that act during this step, as a potential of the velocities.
     acting: PlacedPotentialTerm<Packed<L::Element>>,
@@ -96,11 +96,11 @@ struct PlacedDissipationTerm<L: DissipationLaw> {
 fn acting<L: DissipationLaw>(
     elements: Vec<(usize, L::Element)>,
     term: &DissipationTerm<L>,
-    places: &BlockPlaces,
+    maps: &ScatterMaps,
 ) -> PlacedPotentialTerm<Packed<L::Element>> {
     let (numbers, elements): (Vec<usize>, Vec<L::Element>) = elements.into_iter().unzip();
-    let places = places.of(&numbers);
-    term.on.pack(&elements, Active::some(numbers.into_iter().map(index).collect()), places)
+    let maps = maps.of(&numbers);
+    term.on.pack(&elements, Active::some(numbers.into_iter().map(index).collect()), maps)
 }
 
 /// The state in which velocities take the place of positions.
@@ -147,13 +147,13 @@ impl<L: DissipationLaw + 'static> PlacedTerm for PlacedDissipationTerm<L> {
     /// The law selects elements at the start of a step, which the restriction does not outlive.
     fn restricted(&self, restriction: &Restriction<'_>) -> Option<Box<dyn PlacedTerm>> {
         let (term, acting) = (Arc::clone(&self.term), self.acting.restricted_to(restriction));
-        let (is_free, places, shares) = (Vec::new(), BlockPlaces::default(), Vec::new());
-        Some(Box::new(Self { term, is_free, places, shares, acting }))
+        let (is_free, maps, shares) = (Vec::new(), ScatterMaps::default(), Vec::new());
+        Some(Box::new(Self { term, is_free, maps, shares, acting }))
     }
 
     fn begin_step(&mut self, start: StepStart<'_>) {
         let elements = self.term.law.elements(&start, &self.is_free);
-        self.acting = acting(elements, &self.term, &self.places);
+        self.acting = acting(elements, &self.term, &self.maps);
         self.acting.divide(&self.shares);
     }
 

@@ -10,7 +10,7 @@ use super::placed::PlacedPotentialTerm;
 use crate::matrix::dof_map::DofMap;
 use crate::matrix::pattern::Pattern;
 use crate::terms::active::Active;
-use crate::terms::places::BlockPlaces;
+use crate::terms::scatter_map::ScatterMaps;
 use crate::terms::stencils::Stencils;
 use crate::terms::term::{Character, PlacedTerm, Term, TermDescription};
 
@@ -72,9 +72,9 @@ impl<L: DrivenLaw> TermDescription for DrivenTerm<L> {
 impl<L: DrivenLaw + 'static> Changing for DrivenTerm<L> {
     type Packs = Packed<L::Element>;
 
-    fn pack(&mut self, time: f64, active: &Active, places: &BlockPlaces) -> PlacedPotentialTerm<Packed<L::Element>> {
+    fn pack(&mut self, time: f64, active: &Active, maps: &ScatterMaps) -> PlacedPotentialTerm<Packed<L::Element>> {
         let elements: Vec<L::Element> = active.iter().map(|number| self.law.element(number, time)).collect();
-        self.on.pack(&elements, active.clone(), places.clone())
+        self.on.pack(&elements, active.clone(), maps.clone())
     }
 
     fn varies(&self, from: f64, to: f64) -> bool {

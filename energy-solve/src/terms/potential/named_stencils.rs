@@ -5,7 +5,7 @@ use energy_dsl::{Packed, PackedPotential};
 use super::placed::PlacedPotentialTerm;
 use crate::matrix::pattern::index;
 use crate::terms::active::Active;
-use crate::terms::places::BlockPlaces;
+use crate::terms::scatter_map::ScatterMaps;
 use crate::terms::stencils::Stencils;
 
 /// The name and the stencils of a term whose elements are created again when they change.
@@ -26,17 +26,17 @@ impl NamedStencils {
         Stencils::new(self.arity, &self.vertices)
     }
 
-    /// Packs the active elements, which write to `places`.
+    /// Packs the active elements, which write by `maps`.
     pub fn pack<E: PackedPotential<f64> + Debug + Send + Sync + 'static>(
         &self,
         elements: &[E],
         active: Active,
-        places: BlockPlaces,
+        maps: ScatterMaps,
     ) -> PlacedPotentialTerm<Packed<E>> {
         let stencils = self.stencils();
         let vertex = |number: usize, point: usize| stencils.vertex(active.element(number), point);
         let packed = Packed::from_fn(elements.len(), self.arity, |number| &elements[number], vertex);
         let all = (stencils.len(), self.vertices.clone());
-        PlacedPotentialTerm::in_places(self.name.clone(), all, (active, packed), places)
+        PlacedPotentialTerm::with_maps(self.name.clone(), all, (active, packed), maps)
     }
 }

@@ -21,12 +21,12 @@ impl<'a> PackEnergies<'a> {
 
     #[inline(always)]
     pub(super) fn note<V: Lane<f64>>(&mut self, batch: &Lanes<'_>, values: V) {
-        let place = batch.first % BLOCK;
-        values.store(&mut self.values[place..]);
-        let next = place + V::LANES;
+        let position = batch.first % BLOCK;
+        values.store(&mut self.values[position..]);
+        let next = position + V::LANES;
         if next == BLOCK || batch.first + batch.count == self.elements {
             // Lanes past the last element hold values of an earlier pack.
-            self.values[place + batch.count..].fill(0.0);
+            self.values[position + batch.count..].fill(0.0);
             let sum = pairwise::<4, 2>(pairwise::<8, 4>(pairwise::<BLOCK, 8>(self.values)));
             self.sums[batch.first / BLOCK].store((sum[0] + sum[1]).to_bits(), Relaxed);
         }
@@ -37,8 +37,8 @@ impl<'a> PackEnergies<'a> {
 #[inline(always)]
 fn pairwise<const ALL: usize, const HALF: usize>(numbers: [f64; ALL]) -> [f64; HALF] {
     let mut sums = [0.0; HALF];
-    for place in 0..HALF {
-        sums[place] = numbers[place] + numbers[place + HALF];
+    for position in 0..HALF {
+        sums[position] = numbers[position] + numbers[position + HALF];
     }
     sums
 }

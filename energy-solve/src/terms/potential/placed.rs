@@ -14,8 +14,8 @@ use crate::terms::active::Active;
 use crate::terms::counts::Tally;
 use crate::terms::curvature::Orthonormal;
 use crate::terms::linearisation::Linearisation;
-use crate::terms::places::BlockPlaces;
 use crate::terms::restriction::Restriction;
+use crate::terms::scatter_map::ScatterMaps;
 use crate::terms::share::{Divisible, Share};
 use crate::terms::state::State;
 use crate::terms::stencils::Stencils;
@@ -36,7 +36,7 @@ pub(super) struct PlacedPotentialTerm<E> {
     vertices: Vec<u32>,
     active: Active,
     packed: E,
-    places: BlockPlaces,
+    maps: ScatterMaps,
     orthonormal: Option<Orthonormal>,
     /// The elements that each share needs, in whole packs.
     shares: Vec<Vec<Range<usize>>>,
@@ -53,24 +53,24 @@ impl<E: Evaluated> PlacedPotentialTerm<E> {
         dofs: &DofMap,
         pattern: &Pattern,
     ) -> Self {
-        let mut term = Self::in_places(name, (count, vertices), (active, packed), BlockPlaces::default());
+        let mut term = Self::with_maps(name, (count, vertices), (active, packed), ScatterMaps::default());
         if E::PACK == BLOCK && term.active.is_all() && term.active.len() > 0 {
             // The packs hold them too.
             term.vertices = Vec::new();
         }
-        // Constant Jacobians are evaluated once: their places are looked up then and freed afterwards.
+        // Constant Jacobians are evaluated once: their maps are looked up then and freed afterwards.
         if !term.character().quadratic {
             term.place_blocks(dofs, pattern);
         }
         term
     }
 
-    /// Creates the term from the places of the blocks of its active elements.
-    pub(super) fn in_places(
+    /// Creates the term from the maps of the blocks of its active elements.
+    pub(super) fn with_maps(
         name: String,
         (count, vertices): (usize, Vec<u32>),
         (active, packed): (Active, E),
-        places: BlockPlaces,
+        maps: ScatterMaps,
     ) -> Self {
         let declaration = packed.declaration();
         let (arity, orthonormal) = (declaration.points.len(), Orthonormal::new(declaration));
@@ -82,7 +82,7 @@ impl<E: Evaluated> PlacedPotentialTerm<E> {
             energies: (0..active.len().div_ceil(BLOCK)).map(|_| AtomicU64::default()).collect(),
             active,
             packed,
-            places,
+            maps,
             orthonormal,
             shares: Vec::new(),
         }
@@ -94,8 +94,8 @@ impl<E: Evaluated> PlacedPotentialTerm<E> {
         let numbers = restriction.remaining(self.active.iter(), stencils);
         let vertices = numbers.iter().flat_map(|&number| stencils.stencil(self.active.element(number))).collect();
         let (active, packed) = (Active::all(numbers.len()), self.packed.selected(&numbers));
-        let places = self.places.restricted(&numbers, restriction);
-        Self::in_places(self.name.clone(), (numbers.len(), vertices), (active, packed), places)
+        let maps = self.maps.restricted(&numbers, restriction);
+        Self::with_maps(self.name.clone(), (numbers.len(), vertices), (active, packed), maps)
     }
 
     fn tally(&self, flagged: u64) -> Tally {
@@ -147,8 +147,8 @@ impl<E: Evaluated> PlacedPotentialTerm<E> {
         state: State<'_>,
         sum: &mut Linearisation<'_>,
     ) -> (u64, u64) {
-        let (places, orthonormal) = (&self.places, self.orthonormal.as_ref());
-        let mut hessians = Hessians::new(self.arity, sum, first, state.v, places, orthonormal, self.pack_energies());
+        let (maps, orthonormal) = (&self.maps, self.orthonormal.as_ref());
+        let mut hessians = Hessians::new(self.arity, sum, first, state.v, maps, orthonormal, self.pack_energies());
         self.packed.hessians(packs, state.x, &mut hessians);
         (hessians.flagged, hessians.projected)
     }
@@ -220,13 +220,13 @@ impl<E: Evaluated> TermDescription for PlacedPotentialTerm<E> {
 
 impl<E: Evaluated> PlacedTerm for PlacedPotentialTerm<E> {
     fn place_blocks(&mut self, dofs: &DofMap, pattern: &Pattern) {
-        if self.character().curved && self.places.upper.is_empty() {
-            self.places = BlockPlaces::new(&self.active, self.stencils(), dofs, pattern);
+        if self.character().curved && self.maps.upper.is_empty() {
+            self.maps = ScatterMaps::new(&self.active, self.stencils(), dofs, pattern);
         }
     }
 
     fn forget_blocks(&mut self) {
-        self.places = BlockPlaces::default();
+        self.maps = ScatterMaps::default();
     }
 
     fn restricted(&self, restriction: &Restriction<'_>) -> Option<Box<dyn PlacedTerm>> {

@@ -12,7 +12,7 @@ use super::tapes::TapePacks;
 use crate::matrix::dof_map::DofMap;
 use crate::matrix::pattern::Pattern;
 use crate::terms::active::Active;
-use crate::terms::places::BlockPlaces;
+use crate::terms::scatter_map::ScatterMaps;
 use crate::terms::stencils::Stencils;
 use crate::terms::term::{Character, PlacedTerm, Term, TermDescription};
 
@@ -117,13 +117,13 @@ impl TermDescription for SteeredTapeTerm {
 impl Changing for SteeredTapeTerm {
     type Packs = TapePacks;
 
-    fn pack(&mut self, _: f64, active: &Active, places: &BlockPlaces) -> PlacedPotentialTerm<TapePacks> {
+    fn pack(&mut self, _: f64, active: &Active, maps: &ScatterMaps) -> PlacedPotentialTerm<TapePacks> {
         let (version, elements) = self.tapes.now();
         self.packed = version;
         let TapeTerm { name, declaration, vertices, .. } = &self.term;
         let all = (elements.len(), vertices.clone());
         let packed = TapePacks::of_active(declaration, elements, self.term.stencils(), active);
-        PlacedPotentialTerm::in_places(name.clone(), all, (active.clone(), packed), places.clone())
+        PlacedPotentialTerm::with_maps(name.clone(), all, (active.clone(), packed), maps.clone())
     }
 
     fn varies(&self, _: f64, _: f64) -> bool {

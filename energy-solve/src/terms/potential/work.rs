@@ -4,8 +4,8 @@ use super::pack_energies::PackEnergies;
 use super::waiting::Waiting;
 use crate::terms::curvature::{Curvature, Hinges, Orthonormal, Projection, change_dense, is_semi_definite};
 use crate::terms::linearisation::Linearisation;
-use crate::terms::places::BlockPlaces;
 use crate::terms::scatter::{Lanes, TriangleBuffer, VectorBuffer, points_of_triangle};
+use crate::terms::scatter_map::ScatterMaps;
 
 /// Returns the first `count` lanes of a mask as bits.
 #[inline(always)]
@@ -88,7 +88,7 @@ pub(super) struct Hessians<'a, 'b> {
     first_vertex: usize,
     first_block: usize,
     velocities: &'a [Vector3<f64>],
-    places: &'a BlockPlaces,
+    maps: &'a ScatterMaps,
     orthonormal: Option<&'a Orthonormal>,
     vectors: VectorBuffer,
     triangles: TriangleBuffer,
@@ -104,7 +104,7 @@ impl<'a, 'b> Hessians<'a, 'b> {
         sum: &'a mut Linearisation<'b>,
         (first_vertex, first_block): (usize, usize),
         velocities: &'a [Vector3<f64>],
-        places: &'a BlockPlaces,
+        maps: &'a ScatterMaps,
         orthonormal: Option<&'a Orthonormal>,
         energies: PackEnergies<'a>,
     ) -> Self {
@@ -113,7 +113,7 @@ impl<'a, 'b> Hessians<'a, 'b> {
             first_vertex,
             first_block,
             velocities,
-            places,
+            maps,
             orthonormal,
             vectors: VectorBuffer::new(arity),
             triangles: TriangleBuffer::new(arity),
@@ -184,7 +184,7 @@ impl<'a> Hessians<'a, '_> {
         }
         let (scale, elements) = (V::splat(-self.sum.weights.position), (lanes.first, lanes.count));
         let matrix = (self.first_block, &mut self.sum.matrix);
-        self.triangles.scatter(self.places, elements, scale, triangle, matrix);
+        self.triangles.scatter(self.maps, elements, scale, triangle, matrix);
         let (vertices, first, count) = (lanes.vertices(0), self.first_vertex, self.sum.force.len());
         self.flagged += count_owned(flagged, vertices, first, count);
         self.projected += count_owned(projected, vertices, first, count);

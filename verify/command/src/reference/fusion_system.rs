@@ -58,7 +58,7 @@ pub(super) fn system(case: &Case<'_>, lines: &mut Lines) -> Result<(), String> {
     let truth = case.out("E_after_full_step")?;
     lines.compare(case, ("E_after_full_step", 0.0, 10.0 * BOUND), &[energy_after], truth)?;
 
-    let coupled = |row: usize, column: usize| terms.pattern.place(row, column).is_some();
+    let coupled = |row: usize, column: usize| terms.pattern.slot(row, column).is_some();
     let pattern: Vec<f64> = (0..size * size).map(|at| f64::from(u8::from(coupled(at / size, at % size)))).collect();
     lines.exact(case, "block_pattern", numbers(case.out("block_pattern")?)? == pattern);
     lines.exact(case, "rows", numbers(case.out("rows")?)? == [residuals.len() as f64]);

@@ -93,7 +93,7 @@ impl Untangling<'_> {
             for (_, x) in x.iter_mut().enumerate().filter(|(vertex, _)| self.is_movable[*vertex]) {
                 let missing = wanted - solid.signed_distance(*x);
                 if missing > 0.0 {
-                    *x = add_scaled(*x, missing, outwards(solid, *x, PROBE * start.reach));
+                    *x = add_scaled(*x, missing, normalised(solid.outwards(*x, PROBE * start.reach)));
                 }
             }
         }
@@ -102,18 +102,18 @@ impl Untangling<'_> {
     /// Moves the vertices of one pair after the other, until it is apart in its order.
     fn part(&self, spacings: &Spacings, close: &[(Pair, Closest)], facings: &[Facing], x: &mut [Vector3<f64>]) {
         let mesh = &self.participants.mesh;
-        let mut is_astray = vec![false; x.len()];
+        let mut is_crossed = vec![false; x.len()];
         for Facing { pair, weights, across } in facings {
             let Spacing { thickness, gap } = spacings.of(mesh, pair);
             let apart = separation(pair, weights, across, x);
             if apart < 0.0 {
-                pair.vertices.iter().for_each(|vertex| is_astray[*vertex as usize] = true);
+                pair.vertices.iter().for_each(|vertex| is_crossed[*vertex as usize] = true);
             }
             self.push(pair, weights, across, thickness + OPENING * gap - apart, x);
         }
         for (pair, closest) in close {
             // The distance of features on the wrong side must shrink first.
-            if pair.vertices.iter().any(|vertex| is_astray[*vertex as usize]) {
+            if pair.vertices.iter().any(|vertex| is_crossed[*vertex as usize]) {
                 continue;
             }
             let apart = separation(pair, &closest.weights, &closest.normal, x);
@@ -142,18 +142,10 @@ fn separation(pair: &Pair, weights: &[f64; 4], n: &Vector3<f64>, x: &[Vector3<f6
     weights.iter().zip(&corners).map(|(weight, corner)| weight * dot(*n, subtract(*corner, corners[0]))).sum()
 }
 
-/// The unit vector along which the distance from a solid grows fastest at x; zero at its centre.
-fn outwards(solid: &AnySolid, x: Vector3<f64>, step: f64) -> Vector3<f64> {
-    let slope: Vector3<f64> = std::array::from_fn(|axis| {
-        let at = |side: f64| {
-            let mut x = x;
-            x[axis] += side * step;
-            solid.signed_distance(x)
-        };
-        at(1.0) - at(-1.0)
-    });
-    let length = norm(slope);
-    if length > 0.0 { slope.map(|component| component / length) } else { slope }
+/// A unit vector along another one; zero if that is zero.
+fn normalised(vector: Vector3<f64>) -> Vector3<f64> {
+    let length = norm(vector);
+    if length > 0.0 { vector.map(|component| component / length) } else { vector }
 }
 
 fn largest(numbers: &[f64]) -> f64 {

@@ -31,13 +31,13 @@ struct Sheets {
 }
 
 impl Sheets {
-    /// Adds a square of n × n cells of size h, placed by a map from the plane.
-    fn add(&mut self, n: usize, h: f64, place: impl Fn([f64; 2]) -> Vector3<f64>) {
+    /// Adds a square of n × n cells of size h, mapped from the plane.
+    fn add(&mut self, n: usize, h: f64, map: impl Fn([f64; 2]) -> Vector3<f64>) {
         let first = self.x.len();
         let at = |i: usize, j: usize| first + i * (n + 1) + j;
         for i in 0..=n {
             for j in 0..=n {
-                self.x.push(place([h * (i as f64 - 0.5 * n as f64), h * (j as f64 - 0.5 * n as f64)]));
+                self.x.push(map([h * (i as f64 - 0.5 * n as f64), h * (j as f64 - 0.5 * n as f64)]));
             }
         }
         for i in 0..n {

@@ -42,6 +42,7 @@ pub struct Declared {
 /// A file that cannot serve as a fabric.
 #[derive(Debug, thiserror::Error)]
 #[expect(missing_docs, reason = "the messages name the fields")]
+#[non_exhaustive]
 pub enum DeclaredError {
     /// The file cannot be read.
     #[error("cannot read {}", .path.display())]

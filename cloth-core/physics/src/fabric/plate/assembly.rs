@@ -4,7 +4,7 @@ use energy_dsl::{BLOCK, Batch, BatchWork, Block, Kernel, Lane, Level, Potential,
 use energy_elements::ArcAngle;
 use energy_solve::{Linearisation, Precision, TriangleBuffer};
 
-use super::term::{Angles, PatchPlaces, PlateTerm, Row};
+use super::term::{Angles, PatchSlots, PlateTerm, Row};
 
 /// Number of entries in the upper triangle of ∇²θ.
 const HESSIAN: usize = 90;
@@ -33,7 +33,7 @@ impl BatchWork<ArcAngle> for CurvedPart<'_, '_> {
         let weight = |lane: usize| hinges.get(lane).map_or(0.0, |&hinge| scale * self.moments[hinge]);
         let (weights, elements) = (L::F64::from_fn(weight), (batch.first, batch.count));
         let matrix = (0, &mut self.sum.matrix);
-        self.triangles.scatter(&self.of.hinge_places, elements, weights, &mut result.hessian, matrix);
+        self.triangles.scatter(&self.of.hinge_slots, elements, weights, &mut result.hessian, matrix);
     }
 }
 
@@ -92,7 +92,7 @@ impl<T: Precision> Kernel for OuterProducts<'_, T> {
         let Self { of, angles, s, matrix } = self;
         let s = T::from_f64(s);
         let (mut rows, mut factors): (Vec<Row<T>>, Vec<[Factors<T>; 3]>) = (Vec::new(), Vec::new());
-        for (patches, places) in of.active.chunks(GROUP).zip(of.places.chunks(GROUP)) {
+        for (patches, patch_slots) in of.active.chunks(GROUP).zip(of.patch_slots.chunks(GROUP)) {
             rows.clear();
             for &patch in patches {
                 of.patches[patch].append_gradients(&angles.gradients, &mut rows);
@@ -107,9 +107,9 @@ impl<T: Precision> Kernel for OuterProducts<'_, T> {
                 }
             }
             let mut left = &factors[..];
-            for places in places {
-                let (own, others) = left.split_at(places.vertices);
-                add_outer_products(own, places, matrix);
+            for patch_slots in patch_slots {
+                let (own, others) = left.split_at(patch_slots.vertices);
+                add_outer_products(own, patch_slots, matrix);
                 left = others;
             }
         }
@@ -121,8 +121,8 @@ const GROUP: usize = 8;
 
 /// Adds s ∇r ∇rᵀ of one patch, given the factors of its vertices.
 #[inline(always)]
-fn add_outer_products<T: Precision>(factors: &[[Factors<T>; 3]], places: &PatchPlaces, matrix: &mut [Block<T>]) {
-    let (mut slots, mut mirrored) = (places.slots.iter(), places.mirrored.iter());
+fn add_outer_products<T: Precision>(factors: &[[Factors<T>; 3]], patch_slots: &PatchSlots, matrix: &mut [Block<T>]) {
+    let (mut slots, mut mirrored) = (patch_slots.slots.iter(), patch_slots.mirrored.iter());
     for i in 0..factors.len() {
         for j in i..factors.len() {
             let Some(&slot) = slots.next() else { return };

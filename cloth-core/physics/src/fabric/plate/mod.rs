@@ -41,6 +41,7 @@ use crate::mesh::{Topology, TriangleMesh, Warp, area, material_triangle};
     Warp::Uv => "has no texture coordinates that tell its warp; export UVs without collapsed faces".to_owned(),
 })]
 #[expect(missing_docs, reason = "the messages name the fields")]
+#[non_exhaustive]
 pub struct ThreadError {
     pub triangle: usize,
     /// The direction of the warp.

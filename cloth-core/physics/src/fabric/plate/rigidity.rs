@@ -47,6 +47,7 @@ pub enum Rigidity {
 
 /// Rigidities that contradict each other.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum RigidityError {
     /// Twist would have negative energy.
     #[error(

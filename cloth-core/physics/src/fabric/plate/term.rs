@@ -6,8 +6,8 @@ use energy_dsl::{
 };
 use energy_elements::ArcAngle;
 use energy_solve::{
-    BlockPlaces, Blocks, Character, Curvature as CurvaturePolicy, DofMap, Linearisation, Pattern, PlacedTerm,
-    Precision, Quantity, Restriction, State, Stencils, Storage, Tally, Term, TermDescription, index,
+    Blocks, Character, Curvature as CurvaturePolicy, DofMap, Linearisation, Pattern, PlacedTerm, Precision, Quantity,
+    Restriction, ScatterMaps, State, Stencils, Storage, Tally, Term, TermDescription, index,
 };
 
 use super::assembly::{CurvedPart, OuterProducts};
@@ -37,11 +37,11 @@ pub struct PlateTerm {
     arity: usize,
     /// Patches with a free vertex, and the slots of their blocks; set by [`Term::place`].
     pub(super) active: Vec<usize>,
-    pub(super) places: Vec<PatchPlaces>,
+    pub(super) patch_slots: Vec<PatchSlots>,
     /// Hinges that active patches need; the same, packed; and the slots of their blocks.
     pub(super) needed: Vec<usize>,
     packed: Packed<ArcAngle>,
-    pub(super) hinge_places: BlockPlaces,
+    pub(super) hinge_slots: ScatterMaps,
     /// U where forces or Jacobians were last evaluated, as bits.
     found: AtomicU64,
 }
@@ -67,14 +67,14 @@ struct Angle {
 
 /// Slots of the blocks of a patch: of the pairs i ≤ j, and of the mirrored pairs if the matrix stores both triangles.
 #[derive(Clone, Debug)]
-pub(super) struct PatchPlaces {
+pub(super) struct PatchSlots {
     /// The number of vertices of the patch.
     pub(super) vertices: usize,
     pub(super) slots: Vec<u32>,
     pub(super) mirrored: Vec<u32>,
 }
 
-impl PatchPlaces {
+impl PatchSlots {
     /// Returns the slots in a restricted matrix.
     fn restricted(&self, restriction: &Restriction<'_>) -> Self {
         let slots = |slots: &[u32]| slots.iter().map(|&slot| restriction.slot(slot)).collect();
@@ -84,6 +84,7 @@ impl PatchPlaces {
 
 /// A plate that does not fit a mesh.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum PlateError {
     /// The rigidities contradict each other.
     #[error(transparent)]
@@ -128,10 +129,10 @@ impl PlateTerm {
             stencils,
             arity,
             active: Vec::new(),
-            places: Vec::new(),
+            patch_slots: Vec::new(),
             needed: Vec::new(),
             packed: Packed::new::<4>(&[], &[]),
-            hinge_places: BlockPlaces::default(),
+            hinge_slots: ScatterMaps::default(),
             found: AtomicU64::default(),
         })
     }
@@ -376,7 +377,7 @@ impl TermDescription for PlateTerm {
 
 impl Term for PlateTerm {
     fn place(mut self: Box<Self>, dofs: &DofMap, pattern: &Pattern) -> Box<dyn PlacedTerm> {
-        let is_free = |&vertex: &usize| dofs.place(vertex).is_some();
+        let is_free = |&vertex: &usize| dofs.row(vertex).is_some();
         self.active =
             (0..self.patches.len()).filter(|&patch| self.patches[patch].vertices.iter().any(is_free)).collect();
         let mut needed: Vec<usize> =
@@ -388,12 +389,12 @@ impl Term for PlateTerm {
             Packed::from_fn(needed.len(), 4, |_| &element, |number, point| index(self.hinges[needed[number]][point]));
         self.needed = needed;
         let vertices: Vec<u32> = self.needed.iter().flat_map(|&hinge| self.hinges[hinge].map(index)).collect();
-        self.hinge_places = BlockPlaces::of_all(Stencils::new(4, &vertices), dofs, pattern);
+        self.hinge_slots = ScatterMaps::of_all(Stencils::new(4, &vertices), dofs, pattern);
         let slot = |i: usize, j: usize| {
-            let rows = dofs.place(i).zip(dofs.place(j));
-            index(rows.and_then(|(row, column)| pattern.place(row, column)).map_or(pattern.nowhere(), |(slot, _)| slot))
+            let rows = dofs.row(i).zip(dofs.row(j));
+            index(rows.and_then(|(row, column)| pattern.slot(row, column)).map_or(pattern.nowhere(), |(slot, _)| slot))
         };
-        self.places.clear();
+        self.patch_slots.clear();
         for &patch in &self.active {
             let vertices = &self.patches[patch].vertices;
             let pairs =
@@ -404,7 +405,7 @@ impl Term for PlateTerm {
                 Storage::Upper => Vec::new(),
                 Storage::Whole => pairs().filter(|(i, j)| i != j).map(|(i, j)| slot(j, i)).collect(),
             };
-            self.places.push(PatchPlaces { vertices: vertices.len(), slots, mirrored });
+            self.patch_slots.push(PatchSlots { vertices: vertices.len(), slots, mirrored });
         }
         self
     }
@@ -432,10 +433,10 @@ impl PlacedTerm for PlateTerm {
             stencils: numbers.iter().flat_map(stencil).collect(),
             arity: self.arity,
             active: (0..numbers.len()).collect(),
-            places: numbers.iter().map(|&number| self.places[number].restricted(restriction)).collect(),
+            patch_slots: numbers.iter().map(|&number| self.patch_slots[number].restricted(restriction)).collect(),
             needed: (0..hinges.len()).collect(),
             packed: self.packed.selected(&kept),
-            hinge_places: self.hinge_places.restricted(&kept, restriction),
+            hinge_slots: self.hinge_slots.restricted(&kept, restriction),
             found: AtomicU64::default(),
         }))
     }

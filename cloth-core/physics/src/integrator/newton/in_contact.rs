@@ -1,13 +1,12 @@
-//! Contact within a step of Newton's method: every move is certified, and energies are evaluated at certified states.
+//! Contact within a step of Newton's method: every move is filtered, and energies are evaluated at certified states.
 
 use std::time::Instant;
 
 use energy_dsl::Vector3;
-use energy_solve::{BlockMatrix, Contact, Pressed};
+use energy_solve::{BlockMatrix, Contact, Pressed, Resistance};
 
 use super::super::ContactWork;
 use super::incremental_potential::IncrementalPotential;
-use crate::body::Body;
 
 /// Moves of pins and obstacles within a step, after which they count as blocked.
 pub(super) const PIN_MOVES: usize = 60;
@@ -16,93 +15,98 @@ pub(super) const PIN_MOVES: usize = 60;
 const PIN_SHARE: f64 = 0.5;
 
 impl IncrementalPotential<'_> {
-    /// Forgets the pairs of the last step, and shortens the move to the first iterate x until it is certain to have no
-    /// crossing. Returns the part of their way that pins and obstacles have gone.
-    pub(super) fn begin_contact(&mut self, x: &mut Vec<Vector3<f64>>) -> f64 {
-        let Body { system, x: start, .. } = &mut *self.body;
-        if let Some((contact, _)) = system.contact() {
-            contact.begin_step(start);
-        }
+    /// Shortens the move to the first iterate x until it is certain to have no crossing. Returns the part of their way
+    /// that pins and obstacles have gone.
+    pub(super) fn filter_warm_start(&mut self, x: &mut Vec<Vector3<f64>>) -> f64 {
         let to = std::mem::replace(x, self.body.x.clone());
-        let certified = self.certified(x, &to);
-        let is_prescribed = |vertex: usize| self.body.system.dofs().place(vertex).is_none();
+        let certified = self.filter_step(x, &to);
+        let is_prescribed = |vertex: usize| self.body.system.dofs().row(vertex).is_none();
         let is_driven = (0..x.len()).any(|vertex| is_prescribed(vertex) && self.body.v[vertex] != [0.0; 3]);
         let part = if is_driven { shared(certified) } else { certified };
         blend(x, &to, part);
         if is_driven { part } else { 1.0 }
     }
 
-    /// Returns the part of the straight move that has no crossing.
-    pub(super) fn certified(&mut self, from: &[Vector3<f64>], to: &[Vector3<f64>]) -> f64 {
-        let Some((contact, _)) = self.body.system.contact() else { return 1.0 };
+    /// Returns the part of the straight move that is certified to have no crossing.
+    pub(super) fn filter_step(&mut self, from: &[Vector3<f64>], to: &[Vector3<f64>]) -> f64 {
+        let Some(contact) = &mut self.contact else { return 1.0 };
         let started = Instant::now();
-        let part = contact.certify(from, to);
+        let part = contact.filter_step(from, to);
         self.report.contact = ContactWork::between(&self.counted, &contact.counts());
         self.report.phases.collision += started.elapsed();
         part
     }
 
-    /// Sets the resistance of the vertices to that of an assembled matrix.
-    pub(super) fn set_resistance(&mut self, matrix: &BlockMatrix<f32>) {
+    /// Begins contact at the first iterate x: friction is lagged, and pairs get a stiffness in proportion to that of an
+    /// assembled matrix.
+    pub(super) fn begin_contact(&mut self, x: &[Vector3<f64>], matrix: &BlockMatrix<f32>) {
+        let Some(contact) = &mut self.contact else { return };
         let per_square = 1.0 / (self.dt * self.dt);
         let inertia: Vec<f64> = self.body.masses.iter().map(|mass| per_square * mass).collect();
-        if let Some((contact, dofs)) = self.body.system.contact() {
-            let block = |row: usize| matrix.diagonal(row).map(|row| row.map(|entry| per_square * f64::from(entry)));
-            contact.set_resistance(dofs, (0..dofs.free().len()).map(block).collect(), inertia);
-        }
+        let dofs = self.body.system.dofs();
+        let block = |row: usize| matrix.diagonal(row).map(|row| row.map(|entry| per_square * f64::from(entry)));
+        let resistance = Resistance::new(dofs, (0..dofs.free().len()).map(block), inertia);
+        contact.lag_friction(&resistance);
+        self.resistance = Some(resistance);
+        self.update_active_set(x);
     }
 
-    /// Adds the pairs that meet at x. Returns the change of E there.
-    pub(super) fn meet(&mut self, x: &[Vector3<f64>]) -> f64 {
-        let square = self.dt * self.dt;
-        let Some((contact, _)) = self.body.system.contact() else { return 0.0 };
+    /// Adds the pairs that become active at x. Returns the change of E there.
+    pub(super) fn update_active_set(&mut self, x: &[Vector3<f64>]) -> f64 {
+        let (Some(contact), Some(resistance)) = (&mut self.contact, &self.resistance) else { return 0.0 };
         let started = Instant::now();
-        let change = square * contact.meet(x);
+        let change = self.dt * self.dt * contact.update_active_set(x, resistance);
         self.report.phases.collision += started.elapsed();
         change
     }
 
     /// The contribution of contact to E.
-    pub(super) fn contact_energy(&mut self, x: &[Vector3<f64>]) -> f64 {
-        let square = self.dt * self.dt;
-        self.body.system.contact().map_or(0.0, |(contact, _)| square * contact.energy(x))
+    pub(super) fn contact_energy(&self, x: &[Vector3<f64>]) -> f64 {
+        self.contact.as_ref().map_or(0.0, |contact| self.dt * self.dt * contact.energy(x))
     }
 
     /// Adds the contribution of contact to −∇E of the free vertices.
-    pub(super) fn add_contact(&mut self, x: &[Vector3<f64>], downhill: &mut [Vector3<f64>]) {
+    pub(super) fn add_contact(&self, x: &[Vector3<f64>], downhill: &mut [Vector3<f64>]) {
+        let Some(contact) = &self.contact else { return };
         let square = self.dt * self.dt;
-        if let Some((contact, dofs)) = self.body.system.contact() {
-            let mut force = vec![[0.0; 3]; x.len()];
-            contact.add_force(x, &mut force);
-            for (downhill, &vertex) in downhill.iter_mut().zip(dofs.free()) {
-                for axis in 0..3 {
-                    downhill[axis] += square * force[vertex][axis];
-                }
+        let mut force = vec![[0.0; 3]; x.len()];
+        contact.add_force(x, &mut force);
+        for (downhill, &vertex) in downhill.iter_mut().zip(self.body.system.dofs().free()) {
+            for axis in 0..3 {
+                downhill[axis] += square * force[vertex][axis];
             }
         }
     }
 
     /// Returns where contact presses the most at x.
-    pub(super) fn most_pressed(&mut self, x: &[Vector3<f64>]) -> Option<Pressed> {
-        self.body.system.contact().and_then(|(contact, _)| contact.most_pressed(x))
+    pub(super) fn most_pressed(&self, x: &[Vector3<f64>]) -> Option<Pressed> {
+        self.contact.as_ref()?.most_pressed(x)
     }
 
     /// Returns the stiffness of the contacts, in N/m.
     pub(super) fn contacts(&mut self, x: &[Vector3<f64>]) -> Vec<Vec<Contact>> {
-        let Some((contact, dofs)) = self.body.system.contact() else { return Vec::new() };
-        let contacts = contact.contacts(dofs, x);
+        let Some(contact) = &mut self.contact else { return Vec::new() };
+        let contacts = contact.stiffness(self.body.system.dofs(), x);
         self.report.contact = ContactWork::between(&self.counted, &contact.counts());
         contacts
     }
 
-    /// Moves pins and obstacles that contact has stopped further towards their places at the end of the step. Returns
-    /// the part of the rest of their way that they went.
+    /// Does some work during which only these vertices move.
+    pub(super) fn restricted_to<R>(&mut self, moving: &[bool], work: impl FnOnce(&mut Self) -> R) -> R {
+        self.contact.iter_mut().for_each(|contact| contact.restrict(moving));
+        let done = work(self);
+        self.contact.iter_mut().for_each(|contact| contact.release());
+        done
+    }
+
+    /// Moves pins and obstacles that contact has stopped further towards their positions at the end of the step.
+    /// Returns the part of the rest of their way that they went.
     pub(super) fn move_pins(&mut self, x: &mut [Vector3<f64>]) -> f64 {
         let mut to = x.to_vec();
-        for vertex in (0..x.len()).filter(|&vertex| self.body.system.dofs().place(vertex).is_none()) {
+        for vertex in (0..x.len()).filter(|&vertex| self.body.system.dofs().row(vertex).is_none()) {
             to[vertex] = self.inertial(vertex);
         }
-        let part = shared(self.certified(x, &to));
+        let part = shared(self.filter_step(x, &to));
         blend(x, &to, part);
         part
     }

@@ -4,7 +4,8 @@ use std::time::Instant;
 use energy_dsl::Vector3;
 use energy_solve::threads::for_each;
 use energy_solve::{
-    BlockMatrix, ContactCounts, Curvature, EvaluationError, LinearisationOptions, Precision, State, System, Weights,
+    BlockMatrix, ContactCounts, ContactStep, Curvature, EvaluationError, LinearisationOptions, Precision, Resistance,
+    State, System, Weights,
 };
 
 use super::super::{StepReport, if_finite, moved_by_velocity};
@@ -16,6 +17,10 @@ const PART: usize = 4096;
 /// The incremental potential E of one step, and a record of its evaluations.
 pub(super) struct IncrementalPotential<'a> {
     pub(super) body: &'a mut Body,
+    /// Contact during the step; `None` if the body does not collide.
+    pub(super) contact: Option<Box<dyn ContactStep + 'a>>,
+    /// The resistance of the vertices at the first iterate; `None` before it was assembled.
+    pub(super) resistance: Option<Resistance>,
     pub(super) dt: f64,
     pub(super) report: StepReport,
     /// Counts of contact before the step.
@@ -39,9 +44,9 @@ pub(super) struct EnergyAndGradient {
 }
 
 impl<'a> IncrementalPotential<'a> {
-    pub(super) fn new(body: &'a mut Body, dt: f64) -> Self {
-        let counted = body.system.contact().map_or_else(ContactCounts::default, |(contact, _)| contact.counts());
-        Self { body, dt, report: StepReport::default(), counted }
+    pub(super) fn new(body: &'a mut Body, contact: Option<Box<dyn ContactStep + 'a>>, dt: f64) -> Self {
+        let counted = contact.as_ref().map_or_else(ContactCounts::default, |contact| contact.counts());
+        Self { body, contact, resistance: None, dt, report: StepReport::default(), counted }
     }
 
     /// x̂ of a vertex.
@@ -100,7 +105,7 @@ impl<'a> IncrementalPotential<'a> {
     }
 
     /// Assembles the Hessian M − h² ∂f/∂x − h ∂f/∂v and returns −∇E = M (x̂ − x) + h² f of the free vertices, both
-    /// without contact: pairs may join after this iterate was evaluated ahead.
+    /// without contact: pairs may become active after this iterate was evaluated ahead.
     pub(super) fn linearise<T: Precision>(
         &mut self,
         x: &[Vector3<f64>],
@@ -111,7 +116,7 @@ impl<'a> IncrementalPotential<'a> {
         let Body { system, masses, x: start, v: before, .. } = &mut *self.body;
         let v = velocities_if_needed(system, before, || velocities(x, start, self.dt));
         let weights = Weights { position: -self.dt * self.dt, velocity: -self.dt };
-        let options = LinearisationOptions { weights, curvature, stiffness_times_velocity: false };
+        let options = LinearisationOptions::new(weights, curvature);
         let linear = system.linearise_with_masses(State { x, v: &v }, options, masses, matrix)?;
         let downhill = self.downhill(x, linear.force);
         self.report.phases.assembly += started.elapsed();
@@ -127,10 +132,7 @@ impl<'a> IncrementalPotential<'a> {
         matrix: &mut BlockMatrix<f32>,
     ) -> Result<Option<EnergyAndGradient>, EvaluationError> {
         let Some(downhill) = if_finite(self.linearise(x, curvature, matrix))? else { return Ok(None) };
-        if self.body.system.has_contact() {
-            self.set_resistance(matrix);
-            self.meet(x);
-        }
+        self.begin_contact(x, matrix);
         let energy = self.energy(x)?;
         Ok(energy.value.is_finite().then_some(EnergyAndGradient { energy, downhill }))
     }

@@ -81,9 +81,9 @@ impl<'a> Iterate<'a> {
         trial: &'a mut Trial,
         mut x: Vec<Vector3<f64>>,
     ) -> Result<Self, EvaluationError> {
-        let in_contact = potential.body.system.has_contact();
+        let in_contact = potential.contact.is_some();
         let projection = Projection::on_demand(in_contact);
-        let mut pins = if in_contact { potential.begin_contact(&mut x) } else { 1.0 };
+        let mut pins = if in_contact { potential.filter_warm_start(&mut x) } else { 1.0 };
         let mut found = potential.linearise_if_finite(&x, projection.curvature, &mut memory.matrix)?;
         if found.is_none() && in_contact {
             // Pins must not move before the cloth makes way for them.
@@ -158,7 +158,7 @@ impl<'a> Iterate<'a> {
     }
 
     /// Returns where contact presses the most, if it shortened a move of this step.
-    fn pressed(&mut self) -> Option<Pressed> {
+    fn pressed(&self) -> Option<Pressed> {
         let is_shortened = self.potential.report.contact.shortened > 0;
         is_shortened.then(|| self.potential.most_pressed(&self.x)).flatten()
     }
@@ -200,7 +200,7 @@ impl<'a> Iterate<'a> {
         curvature: Curvature,
         relative_tolerance: f64,
     ) -> Result<(Vec<Vector3<f64>>, SolveReport), StepError> {
-        let options = SolveOptions { relative_tolerance, ..SolveOptions::default() };
+        let options = SolveOptions::new(relative_tolerance);
         let contacts = self.potential.contacts(&self.x);
         let (scale, threads) = (self.potential.dt * self.potential.dt, self.potential.body.system.threads());
         let Memory { matrix, solver } = &mut *self.memory;
@@ -304,7 +304,7 @@ impl<'a> Iterate<'a> {
         self.pin_moves += 1;
         let part = self.potential.move_pins(&mut self.x);
         self.pins = if part == 1.0 { 1.0 } else { self.pins + (1.0 - self.pins) * part };
-        self.potential.meet(&self.x);
+        self.potential.update_active_set(&self.x);
         self.energy = self.potential.energy(&self.x)?;
         (self.gradient, self.linearised) = (None, None);
         Ok(())
@@ -323,7 +323,7 @@ impl<'a> Iterate<'a> {
         self.converged = is_solution && is_whole && self.pins == 1.0 && change < self.options.velocity_tolerance;
         // The next step finds the pairs near the last iterate.
         if !self.converged {
-            self.energy.value += self.potential.meet(&self.x);
+            self.energy.value += self.potential.update_active_set(&self.x);
         }
         self.projection.proceed(Progress { is_solution, is_whole, shrinks });
     }

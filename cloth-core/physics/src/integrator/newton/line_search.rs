@@ -49,7 +49,7 @@ impl IncrementalPotential<'_> {
         mut prefetch: Prefetch<'_>,
     ) -> Result<Option<AcceptedStep>, EvaluationError> {
         let end = self.moved(x, 1.0, &direction.vectors);
-        let allowed = self.certified(x, &end);
+        let allowed = self.filter_step(x, &end);
         let (mut scale, mut end) = (allowed, Some(end));
         if allowed == 0.0 {
             return Ok(None);
@@ -89,7 +89,7 @@ impl IncrementalPotential<'_> {
             let moved = self.moved(x, scale, &direction.vectors);
             // A certificate costs more than an energy.
             let without_contact = self.energy_without_contact(&moved)?;
-            if without_contact.value >= accepted.energy.value || self.certified(x, &moved) < 1.0 {
+            if without_contact.value >= accepted.energy.value || self.filter_step(x, &moved) < 1.0 {
                 break;
             }
             let energy = self.with_contact(without_contact, &moved);
@@ -115,7 +115,7 @@ mod tests {
     fn accepted(shortfall: f64) -> f64 {
         let system = System::new(Vec::new(), &[false]).unwrap();
         let mut body = Body { x: vec![[0.0; 3]], v: vec![[2.0, -1.0, 0.5]], masses: vec![3.0], system };
-        let mut potential = IncrementalPotential::new(&mut body, 0.1);
+        let mut potential = IncrementalPotential::new(&mut body, None, 0.1);
         let x = vec![[0.0; 3]];
         let away = potential.inertial(0);
         let energy = potential.energy(&x).unwrap();

@@ -8,7 +8,7 @@ mod local;
 use std::time::Duration;
 
 use energy_dsl::Vector3;
-use energy_solve::{BlockMatrix, EvaluationError, PlacedTerm, System};
+use energy_solve::{BlockMatrix, ContactStep, EvaluationError, PlacedTerm, System};
 use serde::{Deserialize, Serialize};
 
 use super::linear_solver::{LinearSolver, LinearSolverChoice};
@@ -37,7 +37,7 @@ use iterate::Iterate;
 /// - Every step follows a descent direction and is halved until it lowers E. Projected Hessians are too stiff, so their
 ///   steps are doubled as long as that lowers E further.
 ///
-/// If the body collides, every move is certified to have no crossing ([`energy_solve::ContactModel`]): the warm start,
+/// If the body collides, every move is certified to have no crossing ([`ContactStep::filter_step`]): the warm start,
 /// the motion of pins, each trial step and each lengthened step.
 ///
 /// Every force other than drag needs an energy or a dissipation function. [`crate::fabric::Bending::BridsonForce`] has
@@ -88,6 +88,7 @@ struct Memory {
 
 /// Wall time by phase.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[non_exhaustive]
 pub struct Phases {
     /// Gradients, Hessians and assembly.
     pub assembly: Duration,
@@ -127,6 +128,26 @@ impl Newton {
             Memory { matrix, solver }
         })
     }
+
+    /// Moves the body to the minimum of E. On an error the body is unchanged.
+    fn minimise(
+        &mut self,
+        body: &mut Body,
+        contact: Option<Box<dyn ContactStep + '_>>,
+        dt: f64,
+    ) -> Result<StepReport, StepError> {
+        let mut memory = self.memory_for(&body.system);
+        let x = self.warm_start.begin(body, dt);
+        let potential = IncrementalPotential::new(body, contact, dt);
+        let mut iterate = Iterate::new(self.options, potential, &mut memory, &mut self.trial, x)?;
+        iterate.converge()?;
+        let (x, report) = iterate.into_result();
+        let v = incremental_potential::velocities(&x, &body.x, dt);
+        self.warm_start = WarmStart::after(body, &v, dt, report.solves);
+        (body.x, body.v) = (x, v);
+        self.memory = Some(memory);
+        Ok(report)
+    }
 }
 
 impl Integrator for Newton {
@@ -136,17 +157,11 @@ impl Integrator for Newton {
 
     fn step(&mut self, body: &mut Body, dt: f64) -> Result<StepReport, StepError> {
         check_terms(&body.system)?;
-        let mut memory = self.memory_for(&body.system);
-        let x = self.warm_start.begin(body, dt);
-        let potential = IncrementalPotential::new(body, dt);
-        let mut iterate = Iterate::new(self.options, potential, &mut memory, &mut self.trial, x)?;
-        iterate.converge()?;
-        let (x, report) = iterate.into_result();
-        let v = incremental_potential::velocities(&x, &body.x, dt);
-        self.warm_start = WarmStart::after(body, &v, dt, report.solves);
-        (body.x, body.v) = (x, v);
-        self.memory = Some(memory);
-        Ok(report)
+        let mut contact = body.system.take_contact();
+        let step = contact.as_mut().map(|contact| contact.begin_step(&body.x));
+        let report = self.minimise(body, step, dt);
+        contact.into_iter().for_each(|contact| body.system.set_contact(contact));
+        report
     }
 
     fn memory(&self) -> IntegratorMemory {

@@ -16,6 +16,7 @@ use super::{CornerAttributes, MeshError, TriangleMesh};
 /// An OBJ file that is not a valid mesh.
 #[derive(Debug, thiserror::Error)]
 #[expect(missing_docs, reason = "the messages name the fields")]
+#[non_exhaustive]
 pub enum ObjError {
     /// The file cannot be read, or a line is malformed.
     #[error(transparent)]
@@ -43,6 +44,7 @@ pub enum ObjError {
 
 /// The part of an OBJ file to read, and how to read it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[non_exhaustive]
 pub struct ObjOptions<'a> {
     /// Groups, objects or materials whose faces are read; `None` for all faces.
     pub groups: Option<&'a [String]>,

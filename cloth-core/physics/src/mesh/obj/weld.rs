@@ -1,4 +1,4 @@
-//! Merges vertices at the same place, which exporters double along seams of texture coordinates.
+//! Merges vertices at the same position, which exporters double along seams of texture coordinates.
 
 use std::collections::HashMap;
 

@@ -10,14 +10,14 @@ use crate::terms::stencils::Stencils;
 
 /// Scatter maps of elements whose Hessians are symmetric.
 #[derive(Clone, Debug, Default)]
-pub struct BlockPlaces {
-    /// Places of the blocks (i, j), i ≤ j.
-    pub(crate) upper: Places,
-    /// Places of the blocks (j, i), i < j, if the pattern stores both halves.
-    pub(crate) mirrored: Places,
+pub struct ScatterMaps {
+    /// ScatterMap of the blocks (i, j), i ≤ j.
+    pub(crate) upper: ScatterMap,
+    /// ScatterMap of the blocks (j, i), i < j, if the pattern stores both halves.
+    pub(crate) mirrored: ScatterMap,
 }
 
-impl BlockPlaces {
+impl ScatterMaps {
     /// Looks up the blocks of all elements. Blocks of pinned vertices map to [`Pattern::nowhere`].
     #[must_use]
     pub fn of_all(stencils: Stencils<'_>, dofs: &DofMap, pattern: &Pattern) -> Self {
@@ -27,11 +27,11 @@ impl BlockPlaces {
     /// Looks up the blocks of the active elements.
     pub(crate) fn new(active: &Active, stencils: Stencils<'_>, dofs: &DofMap, pattern: &Pattern) -> Self {
         let n = stencils.arity();
-        let places = |pairs: &[_]| Places::new(active, stencils, pairs, dofs, pattern);
-        let upper = places(&(0..n).flat_map(|i| (i..n).map(move |j| (i, j))).collect::<Vec<_>>());
+        let maps = |pairs: &[_]| ScatterMap::new(active, stencils, pairs, dofs, pattern);
+        let upper = maps(&(0..n).flat_map(|i| (i..n).map(move |j| (i, j))).collect::<Vec<_>>());
         let mirrored = match pattern.storage() {
-            Storage::Upper => Places::default(),
-            Storage::Whole => places(&(0..n).flat_map(|i| (i + 1..n).map(move |j| (j, i))).collect::<Vec<_>>()),
+            Storage::Upper => ScatterMap::default(),
+            Storage::Whole => maps(&(0..n).flat_map(|i| (i + 1..n).map(move |j| (j, i))).collect::<Vec<_>>()),
         };
         Self { upper, mirrored }
     }
@@ -52,7 +52,7 @@ impl BlockPlaces {
 /// Scatter map from elements to a matrix: the block index of each pair of an element's points. If the pattern stores
 /// only block (j, i) of a pair, the block (i, j) is transposed first.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Places {
+pub(crate) struct ScatterMap {
     pairs: usize,
     /// Block indices, by element, then pair.
     slots: Vec<u32>,
@@ -60,7 +60,7 @@ pub(crate) struct Places {
     transposed: Vec<u16>,
 }
 
-impl Places {
+impl ScatterMap {
     /// Looks up the blocks of the active elements, for each of the `pairs` of points.
     pub(crate) fn new(
         active: &Active,
@@ -72,10 +72,10 @@ impl Places {
         let mut slots = Vec::with_capacity(active.len() * pairs.len());
         let mut transposed = vec![0; active.len().div_ceil(BLOCK) * pairs.len()];
         for (number, element) in active.iter().enumerate() {
-            let row = |point: usize| dofs.place(stencils.vertex(element, point) as usize);
+            let row = |point: usize| dofs.row(stencils.vertex(element, point) as usize);
             for (pair, &(i, j)) in pairs.iter().enumerate() {
-                let place = row(i).zip(row(j)).and_then(|(row, column)| pattern.place(row, column));
-                let (slot, flipped) = place.unwrap_or((pattern.nowhere(), false));
+                let found = row(i).zip(row(j)).and_then(|(row, column)| pattern.slot(row, column));
+                let (slot, flipped) = found.unwrap_or((pattern.nowhere(), false));
                 slots.push(index(slot));
                 transposed[number / BLOCK * pairs.len() + pair] |= u16::from(flipped) << (number % BLOCK);
             }
@@ -98,9 +98,9 @@ impl Places {
 
     /// Returns the map of some of the elements to a restricted matrix.
     pub(crate) fn restricted(&self, elements: &[usize], restriction: &Restriction<'_>) -> Self {
-        let mut places = self.selected(elements);
-        places.slots.iter_mut().for_each(|slot| *slot = restriction.slot(*slot));
-        places
+        let mut maps = self.selected(elements);
+        maps.slots.iter_mut().for_each(|slot| *slot = restriction.slot(*slot));
+        maps
     }
 
     /// Whether the map is empty.

@@ -5,14 +5,14 @@ use energy_solve::threads::{for_each, ranges};
 
 use super::{Closest, Near, PART, Pair, Search, Separations};
 
-/// Some pairs, in order, and how far they are apart at one place.
+/// Candidate pairs, in order, and how far they are apart where they were last measured.
 #[derive(Clone, Debug, Default)]
-pub struct Nearby {
+pub struct Candidates {
     pairs: Vec<Pair>,
     separations: Separations,
 }
 
-impl Nearby {
+impl Candidates {
     /// Takes pairs, which are not yet measured.
     pub fn new(pairs: Vec<Pair>) -> Self {
         Self { pairs, separations: Separations::default() }
@@ -39,26 +39,26 @@ impl Nearby {
     }
 
     /// Measures the pairs at x, unless they have been measured there.
-    pub fn visit(&mut self, search: &Search, x: &[Vector3<f64>]) {
+    pub fn measure(&mut self, search: &Search, x: &[Vector3<f64>]) {
         self.separations.measure(&self.pairs, x, search.halves(), search.threads);
     }
 
     /// Measures the pairs at x, and drops those that cannot come within reach while no vertex goes farther than this
-    /// from x: boxes of tilted features meet long before the features do.
+    /// from x: boxes of tilted features overlap long before the features do.
     pub fn keep_near(&mut self, search: &Search, x: &[Vector3<f64>], farthest: &[f64]) {
-        self.visit(search, x);
+        self.measure(search, x);
         let kept = self.filtered(search.threads, |Entry { pair, separation, .. }| {
             separation - pair.approach(farthest) <= search.reach(pair)
         });
-        *self = kept.at(std::mem::take(&mut self.separations.place));
+        *self = kept.at(std::mem::take(&mut self.separations.x));
     }
 
     /// Returns the pairs that have any of these vertices.
     pub fn with_any(&self, vertices: &[bool], threads: usize) -> Self {
-        self.filtered(threads, |entry| entry.pair.has_any(vertices)).at(self.separations.place.clone())
+        self.filtered(threads, |entry| entry.pair.has_any(vertices)).at(self.separations.x.clone())
     }
 
-    /// Returns the pairs of both. The distances of the others must be the same at both places of measurement.
+    /// Returns the pairs of both. The distances of the others must be the same where both were measured.
     pub fn joined_with(self, others: &Self, threads: usize) -> Self {
         if others.pairs.is_empty() {
             return self;
@@ -67,29 +67,29 @@ impl Nearby {
     }
 
     /// Returns these pairs, and those of the others without any of some vertices. The distances of the others must be
-    /// the same at both places of measurement.
+    /// the same where both were measured.
     pub fn joined_with_others(self, others: &Self, vertices: &[bool], threads: usize) -> Self {
         self.joined_with_some(others, |entry| !entry.pair.has_any(vertices), threads)
     }
 
     fn joined_with_some(self, others: &Self, is_one: impl Fn(&Entry<'_>) -> bool + Sync, threads: usize) -> Self {
         let longer = if self.pairs.len() > others.pairs.len() { &self.pairs } else { &others.pairs };
-        let place_in = |pairs: &[Pair], number: usize| match number {
+        let position_in = |pairs: &[Pair], number: usize| match number {
             0 => 0,
             _ if number == longer.len() => pairs.len(),
             _ => pairs.partition_point(|pair| *pair < longer[number]),
         };
         let parts = for_each(threads, ranges(threads, longer.len(), PART), |part| {
             let [own, other] = [&self, others].map(|list| {
-                let part = place_in(&list.pairs, part.start)..place_in(&list.pairs, part.end);
+                let part = position_in(&list.pairs, part.start)..position_in(&list.pairs, part.end);
                 (part.len(), list.entries(part))
             });
             Self::collect(own.0 + other.0, merged(own.1, other.1.filter(&is_one)))
         });
-        Self::concatenated(parts).at(self.separations.place)
+        Self::concatenated(parts).at(self.separations.x)
     }
 
-    /// Returns some of the pairs, without their place.
+    /// Returns some of the pairs, not yet measured.
     fn filtered(&self, threads: usize, is_one: impl Fn(&Entry<'_>) -> bool + Sync) -> Self {
         let parts = for_each(threads, ranges(threads, self.pairs.len(), PART), |part| {
             Self::collect(part.len(), self.entries(part).filter(&is_one))
@@ -97,7 +97,7 @@ impl Nearby {
         Self::concatenated(parts)
     }
 
-    /// Collects pairs in order, without their place. `most` bounds their number.
+    /// Collects pairs in order, not yet measured. `most` bounds their number.
     fn collect<'a>(most: usize, entries: impl Iterator<Item = Entry<'a>>) -> Self {
         let (mut pairs, mut all, mut near) = (Vec::with_capacity(most), Vec::with_capacity(most), Vec::new());
         for (number, Entry { pair, separation, closest }) in entries.enumerate() {
@@ -105,10 +105,10 @@ impl Nearby {
             all.push(separation);
             near.extend(closest.map(|closest| Near { number, closest: *closest }));
         }
-        Self { pairs, separations: Separations { place: Vec::new(), all, near } }
+        Self { pairs, separations: Separations { x: Vec::new(), all, near } }
     }
 
-    /// Concatenates parts, without their place.
+    /// Concatenates parts, not yet measured.
     fn concatenated(parts: Vec<Self>) -> Self {
         let mut parts = parts.into_iter();
         let mut whole = parts.next().unwrap_or_default();
@@ -121,9 +121,9 @@ impl Nearby {
         whole
     }
 
-    /// Returns the pairs, measured at this place.
-    fn at(mut self, place: Vec<Vector3<f64>>) -> Self {
-        self.separations.place = place;
+    /// Returns the pairs, measured at these positions.
+    fn at(mut self, x: Vec<Vector3<f64>>) -> Self {
+        self.separations.x = x;
         self
     }
 
@@ -170,24 +170,24 @@ mod tests {
     use crate::collision::PairKind;
 
     /// Pairs with these numbers; multiples of three are within reach.
-    fn numbered(numbers: impl Iterator<Item = u32>) -> Nearby {
-        let mut nearby = Nearby::default();
-        for (place, number) in numbers.enumerate() {
+    fn numbered(numbers: impl Iterator<Item = u32>) -> Candidates {
+        let mut candidates = Candidates::default();
+        for (position, number) in numbers.enumerate() {
             let (features, separation) = ([number, 0], f64::from(number));
-            nearby.pairs.push(Pair { kind: PairKind::EdgeEdge, features, vertices: [number; 4] });
-            nearby.separations.all.push(separation);
+            candidates.pairs.push(Pair { kind: PairKind::EdgeEdge, features, vertices: [number; 4] });
+            candidates.separations.all.push(separation);
             if number.is_multiple_of(3) {
                 let closest = Closest { weights: [0.0; 4], normal: [0.0; 3], distance: separation, separation };
-                nearby.separations.near.push(Near { number: place, closest });
+                candidates.separations.near.push(Near { number: position, closest });
             }
         }
-        nearby
+        candidates
     }
 
-    fn assert_same(found: &Nearby, expected: &Nearby, case: &str) {
+    fn assert_same(found: &Candidates, expected: &Candidates, case: &str) {
         assert_eq!(found.pairs, expected.pairs, "{case}");
         assert_eq!(found.separations(), expected.separations(), "{case}");
-        let near = |nearby: &Nearby| nearby.within_reach().map(|(pair, _)| *pair).collect::<Vec<_>>();
+        let near = |candidates: &Candidates| candidates.within_reach().map(|(pair, _)| *pair).collect::<Vec<_>>();
         assert_eq!(near(found), near(expected), "{case}");
     }
 

@@ -22,14 +22,14 @@ pub(crate) fn in_parts<I: Send, R: Send>(
         return vec![work(items, &SpinBarrier::new(1))];
     };
     let threads = threads.min(pool.current_num_threads());
-    let (meeting, agreed, results) = (Meeting::default(), OnceLock::new(), Results::default());
+    let (rendezvous, agreed, results) = (Rendezvous::default(), OnceLock::new(), Results::default());
     let take_part = |number: usize, (barrier, parts): &(SpinBarrier, Vec<Mutex<Vec<I>>>)| {
         let part = std::mem::take(&mut *parts[number].lock().expect("no thread panics while it takes a part"));
         let _participation = barrier.participate();
         results.add(number, work(part, barrier));
     };
     let help = || {
-        let Some(number) = meeting.join() else { return };
+        let Some(number) = rendezvous.join() else { return };
         let agreed = loop {
             match agreed.get() {
                 Some(agreed) => break agreed,
@@ -39,7 +39,7 @@ pub(crate) fn in_parts<I: Send, R: Send>(
         take_part(number, agreed);
     };
     let lead = || {
-        let participants = meeting.begin(threads);
+        let participants = rendezvous.begin(threads);
         let parts = split(items, participants).into_iter().map(Mutex::new).collect();
         take_part(0, agreed.get_or_init(|| (SpinBarrier::new(participants), parts)));
     };
@@ -49,9 +49,9 @@ pub(crate) fn in_parts<I: Send, R: Send>(
 
 /// The threads that have come to work together.
 #[derive(Debug, Default)]
-struct Meeting(AtomicUsize);
+struct Rendezvous(AtomicUsize);
 
-impl Meeting {
+impl Rendezvous {
     /// Is added when the work begins.
     const BEGUN: usize = 1 << (usize::BITS - 1);
 
@@ -96,10 +96,10 @@ mod tests {
 
     #[test]
     fn a_thread_that_comes_too_late_does_not_take_part() {
-        let meeting = Meeting::default();
-        assert_eq!(meeting.join(), Some(1));
-        assert_eq!(meeting.begin(3), 2);
-        assert_eq!(meeting.join(), None);
+        let rendezvous = Rendezvous::default();
+        assert_eq!(rendezvous.join(), Some(1));
+        assert_eq!(rendezvous.begin(3), 2);
+        assert_eq!(rendezvous.join(), None);
     }
 
     #[test]

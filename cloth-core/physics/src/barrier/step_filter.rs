@@ -1,22 +1,22 @@
-//! Judges moves by the pairs near them.
+//! The step filter: finds the part of a move during which all candidates certainly keep their clearance.
 
 use energy_solve::threads::for_each;
 
 use super::spacing::Spacings;
-use crate::collision::{Clearance, CollisionMesh, Move, Nearby, PART, Pair};
+use crate::collision::{Candidates, Clearance, CollisionMesh, Move, PART, Pair};
 
-/// Judges a move by the pairs near it.
-pub(super) struct Judge<'a> {
+/// Filters a move by some candidates.
+pub(super) struct StepFilter<'a> {
     pub mesh: &'a CollisionMesh,
     pub spacings: &'a Spacings,
     pub step: &'a Move<'a>,
-    /// The pairs, measured at the start of the move.
-    pub nearby: &'a Nearby,
+    /// The candidates, measured at the start of the move.
+    pub candidates: &'a Candidates,
 }
 
-/// The result for a move.
-pub(super) struct Judgement {
-    /// The part of the move during which all pairs certainly keep their clearance.
+/// The result of a filter.
+pub(super) struct FilteredStep {
+    /// The part of the move that is certified.
     pub part: f64,
     /// The number of pairs.
     pub pairs: u64,
@@ -26,35 +26,35 @@ pub(super) struct Judgement {
     pub blocking: Vec<Pair>,
 }
 
-impl Judge<'_> {
+impl StepFilter<'_> {
     /// Threads find the few pairs that are not safe at first sight. These shorten the move one after the other.
-    pub fn judge(&self, threads: usize) -> Judgement {
-        let pairs = self.nearby.pairs();
+    pub fn filter(&self, threads: usize) -> FilteredStep {
+        let pairs = self.candidates.pairs();
         let parts: Vec<_> = pairs.chunks(PART).enumerate().map(|(number, part)| (number * PART, part)).collect();
-        let mut judgement = Judgement { part: 1.0, pairs: pairs.len() as u64, tested: 0, blocking: Vec::new() };
+        let mut filtered = FilteredStep { part: 1.0, pairs: pairs.len() as u64, tested: 0, blocking: Vec::new() };
         if pairs.is_empty() {
-            return judgement;
+            return filtered;
         }
         let farthest = self.farthest();
         for (tested, doubtful) in for_each(threads, parts, |(first, part)| self.doubtful(first, part, farthest)) {
-            judgement.tested += tested;
+            filtered.tested += tested;
             for number in doubtful {
                 let pair = &pairs[number];
-                let own = self.step.safe_part(pair, self.clearance(pair), judgement.part);
+                let own = self.step.safe_part(pair, self.clearance(pair), filtered.part);
                 if own < 1.0 {
-                    judgement.blocking.push(*pair);
+                    filtered.blocking.push(*pair);
                 }
-                judgement.part = own.min(judgement.part);
+                filtered.part = own.min(filtered.part);
             }
         }
-        judgement
+        filtered
     }
 
     /// The number of pairs that comparisons of distances do not dismiss, and those that are not safe at first sight,
     /// among consecutive pairs from number `first` on.
     fn doubtful(&self, first: usize, pairs: &[Pair], farthest: f64) -> (u64, Vec<usize>) {
         let mut close = Vec::new();
-        for (number, (pair, separation)) in (first..).zip(pairs.iter().zip(&self.nearby.separations()[first..])) {
+        for (number, (pair, separation)) in (first..).zip(pairs.iter().zip(&self.candidates.separations()[first..])) {
             if *separation > farthest {
                 continue;
             }
@@ -63,7 +63,7 @@ impl Judge<'_> {
                 close.push((number, clearance));
             }
         }
-        (close.len() as u64, self.step.doubtful(self.nearby.pairs(), &close))
+        (close.len() as u64, self.step.doubtful(self.candidates.pairs(), &close))
     }
 
     /// Pairs beyond this distance certainly stay out of reach, in m.

@@ -9,21 +9,26 @@ use super::{Hierarchy, RoundedMovingBounds, Volume};
 impl<B: Volume> Hierarchy<B> {
     /// Calls `found` with each pair of items of two trees whose boxes overlap, in any order, among some pairs of groups
     /// of these trees. Boxes are rounded outwards to single precision.
-    pub fn meeting(&self, other: &Self, groups: impl IntoIterator<Item = [usize; 2]>, found: impl FnMut(usize, usize)) {
+    pub fn overlaps_with(
+        &self,
+        other: &Self,
+        groups: impl IntoIterator<Item = [usize; 2]>,
+        found: impl FnMut(usize, usize),
+    ) {
         let waiting = groups.into_iter().filter_map(|[a, b]| Some((self.root(a)?, other.root(b)?))).collect();
-        dispatch(Meeting { first: self, second: other, is_one_tree: false, waiting, found });
+        dispatch(Overlaps { first: self, second: other, is_one_tree: false, waiting, found });
     }
 
     /// Calls `found` with each pair of different items whose boxes overlap, once and in any order, among some pairs of
     /// groups. Boxes are rounded outwards to single precision.
-    pub fn meeting_itself(&self, groups: impl IntoIterator<Item = [usize; 2]>, found: impl FnMut(usize, usize)) {
+    pub fn overlaps_within(&self, groups: impl IntoIterator<Item = [usize; 2]>, found: impl FnMut(usize, usize)) {
         let waiting = groups.into_iter().filter_map(|[a, b]| Some((self.root(a)?, self.root(b)?))).collect();
-        dispatch(Meeting { first: self, second: self, is_one_tree: true, waiting, found });
+        dispatch(Overlaps { first: self, second: self, is_one_tree: true, waiting, found });
     }
 }
 
 /// Finds all pairs below some pairs of nodes.
-struct Meeting<'a, B, F> {
+struct Overlaps<'a, B, F> {
     first: &'a Hierarchy<B>,
     second: &'a Hierarchy<B>,
     is_one_tree: bool,
@@ -31,7 +36,7 @@ struct Meeting<'a, B, F> {
     found: F,
 }
 
-impl<B: Volume, F: FnMut(usize, usize)> Kernel for Meeting<'_, B, F> {
+impl<B: Volume, F: FnMut(usize, usize)> Kernel for Overlaps<'_, B, F> {
     type Output = ();
 
     #[inline(always)]
@@ -57,18 +62,18 @@ impl<B: Volume, F: FnMut(usize, usize)> Kernel for Meeting<'_, B, F> {
     }
 }
 
-impl<B: Volume, F: FnMut(usize, usize)> Meeting<'_, B, F> {
+impl<B: Volume, F: FnMut(usize, usize)> Overlaps<'_, B, F> {
     /// Compares each box of one node with all of another, or with those after it in the same node.
     #[inline(always)]
     fn compare<L: Level>(&mut self, one: &Node<B>, other: &Node<B>, is_same: bool) {
         let Self { first, second, found, .. } = self;
         let around = RoundedMovingBounds::around(&other.bounds);
-        for place in first.rounded.overlapping::<L, B>(one.from, one.to, &around) {
-            let from = if is_same { place + 1 } else { other.from };
+        for number in first.rounded.overlapping::<L, B>(one.from, one.to, &around) {
+            let from = if is_same { number + 1 } else { other.from };
             for with in
-                second.rounded.overlapping::<L, B>(from, other.to, &RoundedMovingBounds::around(&first.boxes[place]))
+                second.rounded.overlapping::<L, B>(from, other.to, &RoundedMovingBounds::around(&first.boxes[number]))
             {
-                found(first.items[place], second.items[with]);
+                found(first.items[number], second.items[with]);
             }
         }
     }

@@ -7,9 +7,9 @@ use super::PART;
 use super::law::{Barrier, Law, Order, evaluate};
 use crate::collision::{Closest, Measured, MeasuredPart, Pair};
 
-/// The pairs in contact, or close to it, in order.
+/// The pairs in contact, or close to it, in order. Only some of them have an energy where they are.
 #[derive(Debug, Default)]
-pub(super) struct Joined {
+pub(super) struct ActiveSet {
     pub pairs: Vec<Pair>,
     pub laws: Vec<Law>,
     /// All pairs before those of some vertices were selected.
@@ -18,8 +18,8 @@ pub(super) struct Joined {
     measured: RefCell<Measured>,
 }
 
-/// Pairs that have an energy where they are.
-pub(super) struct Active<'a> {
+/// The pairs of a part of the active set that have an energy where they are.
+pub(super) struct ActivePart<'a> {
     /// The first pair of the part; `None` for the first part.
     pub first: Option<&'a Pair>,
     /// The first pair of the next part; `None` for the last part.
@@ -30,7 +30,7 @@ pub(super) struct Active<'a> {
     barriers: Vec<Barrier>,
 }
 
-impl Joined {
+impl ActiveSet {
     pub fn clear(&mut self) {
         self.pairs.clear();
         self.laws.clear();
@@ -43,14 +43,14 @@ impl Joined {
         let mut before = self.pairs.len();
         self.pairs.extend(added.iter().map(|(pair, _)| *pair));
         self.laws.extend(added.iter().map(|(_, law)| *law));
-        // The last ones first, so that each known pair moves once at most.
-        for (place, (pair, law)) in added.into_iter().enumerate().rev() {
+        // The last ones first, so that each active pair moves once at most.
+        for (number, (pair, law)) in added.into_iter().enumerate().rev() {
             while before > 0 && self.pairs[before - 1] > pair {
                 before -= 1;
-                self.pairs[before + place + 1] = self.pairs[before];
-                self.laws[before + place + 1] = self.laws[before];
+                self.pairs[before + number + 1] = self.pairs[before];
+                self.laws[before + number + 1] = self.laws[before];
             }
-            (self.pairs[before + place], self.laws[before + place]) = (pair, law);
+            (self.pairs[before + number], self.laws[before + number]) = (pair, law);
         }
         self.measured.get_mut().clear();
     }
@@ -64,7 +64,7 @@ impl Joined {
         self.measured.get_mut().clear();
     }
 
-    /// Takes all pairs again, and keeps those that joined meanwhile.
+    /// Takes all pairs again, and keeps those that became active meanwhile.
     pub fn release(&mut self) {
         let Some((pairs, laws)) = self.unrestricted.take() else { return };
         let chosen = std::mem::replace(&mut self.pairs, pairs).into_iter();
@@ -83,7 +83,7 @@ impl Joined {
         x: &[Vector3<f64>],
         order: Order,
         threads: usize,
-        of_part: impl Fn(&Active<'_>) -> R + Sync,
+        of_part: impl Fn(&ActivePart<'_>) -> R + Sync,
     ) -> Vec<R> {
         let (pairs, mut measured) = (&self.pairs, self.measured.borrow_mut());
         let parts = measured.at(pairs, x, PART).zip(self.laws.chunks(PART)).enumerate().collect();
@@ -94,12 +94,12 @@ impl Joined {
             let barriers = evaluate(order, laws, measured, &numbers);
             let first = if number == 0 { None } else { measured.pairs.first() };
             let end = pairs.get((number + 1) * PART);
-            of_part(&Active { first, end, measured, numbers, barriers })
+            of_part(&ActivePart { first, end, measured, numbers, barriers })
         })
     }
 }
 
-impl Active<'_> {
+impl ActivePart<'_> {
     /// The number of pairs.
     pub fn len(&self) -> usize {
         self.numbers.len()
@@ -130,37 +130,37 @@ mod tests {
         numbers.map(|number| (pair(number), law(number))).collect()
     }
 
-    fn assert_holds(joined: &Joined, numbers: impl Iterator<Item = u32>) {
+    fn assert_holds(set: &ActiveSet, numbers: impl Iterator<Item = u32>) {
         let (pairs, laws): (Vec<_>, Vec<_>) = numbered(numbers).into_iter().unzip();
-        assert_eq!(joined.pairs, pairs);
+        assert_eq!(set.pairs, pairs);
         let stiffnesses = |laws: &[Law]| laws.iter().map(|law| law.stiffness).collect::<Vec<_>>();
-        assert_eq!(stiffnesses(&joined.laws), stiffnesses(&laws));
+        assert_eq!(stiffnesses(&set.laws), stiffnesses(&laws));
     }
 
     #[test]
     fn pairs_stay_in_order_with_their_laws() {
-        let mut joined = Joined::default();
-        joined.extend(numbered((0..30).rev().filter(|number| number % 3 == 1)));
-        joined.extend(numbered((0..40).filter(|number| number % 3 == 0)));
-        joined.extend(Vec::new());
-        joined.extend(numbered([32, 2].into_iter()));
+        let mut set = ActiveSet::default();
+        set.extend(numbered((0..30).rev().filter(|number| number % 3 == 1)));
+        set.extend(numbered((0..40).filter(|number| number % 3 == 0)));
+        set.extend(Vec::new());
+        set.extend(numbered([32, 2].into_iter()));
         assert_holds(
-            &joined,
+            &set,
             (0..40).filter(|number| number % 3 == 0 || [2, 32].contains(number) || *number < 30 && number % 3 == 1),
         );
     }
 
     #[test]
-    fn pairs_that_join_while_others_are_left_out_stay() {
-        let mut joined = Joined::default();
-        joined.extend(numbered((0..40).filter(|number| number % 2 == 0)));
+    fn pairs_that_become_active_while_others_are_left_out_stay() {
+        let mut set = ActiveSet::default();
+        set.extend(numbered((0..40).filter(|number| number % 2 == 0)));
         let vertices: Vec<bool> = (0..40).map(|number| number % 4 < 2).collect();
-        joined.restrict(&vertices);
-        assert_holds(&joined, (0..40).filter(|number| number % 4 == 0));
-        joined.extend(numbered((0..40).filter(|number| number % 8 == 1)));
-        joined.release();
-        assert_holds(&joined, (0..40).filter(|number| number % 2 == 0 || number % 8 == 1));
-        joined.release();
-        assert_holds(&joined, (0..40).filter(|number| number % 2 == 0 || number % 8 == 1));
+        set.restrict(&vertices);
+        assert_holds(&set, (0..40).filter(|number| number % 4 == 0));
+        set.extend(numbered((0..40).filter(|number| number % 8 == 1)));
+        set.release();
+        assert_holds(&set, (0..40).filter(|number| number % 2 == 0 || number % 8 == 1));
+        set.release();
+        assert_holds(&set, (0..40).filter(|number| number % 2 == 0 || number % 8 == 1));
     }
 }
