@@ -110,6 +110,17 @@ impl Register for __m512 {
         <Self as Register>::load(&std::array::from_fn::<_, 16, _>(value))
     }
 
+    #[inline(always)]
+    fn store_transposed(numbers: &[Lanes<Self>], count: usize, out: &mut [f32], stride: usize) {
+        check_transposed::<f32, Lanes<Self>>(numbers.len(), count, out.len(), stride);
+        // SAFETY: there are as many places as was checked.
+        unsafe { transpose::store_16_single(numbers, count, out, stride) };
+    }
+    #[inline(always)]
+    fn gather(points: &[[f32; 3]], indices: &[u32]) -> [Self; 3] {
+        transpose::gather_16_single(points, indices)
+    }
+
     elementary_of_singles!();
 
     intrinsics! {
