@@ -554,3 +554,16 @@ impl Limit {
         Self::Finite(factor(0.0), 1.0)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sizes_have_no_sign() {
+        for x in [-3.0, 3.0] {
+            let Limit::Finite(size, _) = Series::number(x).abs().limit() else { panic!("a number has a limit") };
+            assert_eq!(size.to_scalar(), 3.0);
+        }
+    }
+}

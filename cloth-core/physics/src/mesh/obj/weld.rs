@@ -87,8 +87,7 @@ impl<'a> Tree<'a> {
             let axis = (0..3).max_by(|&a, &b| size[a].total_cmp(&size[b])).expect("there are three axes");
             let middle = members.len() / 2;
             let coordinate = |vertex: &u32| vertices[*vertex as usize][axis];
-            self.order[members.clone()]
-                .select_nth_unstable_by(middle, |a, b| coordinate(a).total_cmp(&coordinate(b)));
+            self.order[members.clone()].select_nth_unstable_by(middle, |a, b| coordinate(a).total_cmp(&coordinate(b)));
             self.add(members.start..members.start + middle);
             self.nodes[node].second = Some(self.nodes.len());
             self.add(members.start + middle..members.end);

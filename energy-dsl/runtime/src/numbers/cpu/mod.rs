@@ -222,3 +222,72 @@ fn run_at<K: Kernel>(_name: LevelName, kernel: K) -> K::Output {
 fn run_scalar<K: Kernel>(_name: LevelName, kernel: K) -> K::Output {
     kernel.run::<Baseline>()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::numbers::{Lane, Mask, Number};
+
+    /// Checks what moves numbers between lanes and slices, for one type of lanes.
+    fn check<S: Number + Copy + PartialEq + std::fmt::Debug, V: Lane<S>>() {
+        let number = |number: usize| S::from_f64(number as f64);
+        let lanes = V::LANES;
+        for rows in 1..20 {
+            let wide: Vec<V> = (0..rows).map(|row| V::from_fn(|lane| number(100 * lane + row))).collect();
+            for (count, stride) in [(lanes, rows), (lanes, rows + 3), (lanes - 1, rows + 1), (1, rows), (0, rows)] {
+                let mut out = vec![number(9_999); lanes * stride];
+                V::store_transposed(&wide, count, &mut out, stride);
+                for (place, &found) in out.iter().enumerate() {
+                    let (lane, row) = (place / stride, place % stride);
+                    let is_written = lane < count && row < rows;
+                    assert_eq!(found, if is_written { number(100 * lane + row) } else { number(9_999) });
+                }
+            }
+        }
+        let points: Vec<[S; 3]> = (0..40).map(|at| [0, 1, 2].map(|axis| number(10 * at + axis))).collect();
+        let indices: Vec<u32> = (0..lanes as u32).map(|lane| (7 * lane + 3) % 40).collect();
+        for (axis, gathered) in V::gather(&points, &indices).into_iter().enumerate() {
+            assert!((0..lanes).all(|lane| gathered.extract(lane) == points[indices[lane] as usize][axis]));
+        }
+        let all = (1 << lanes) - 1;
+        assert_eq!((V::Mask::none().bits(), (!V::Mask::none()).bits() & all), (0, all));
+        for bits in [0, all, 1, 0b10 & all, 1 << (lanes - 1)] {
+            let mask = V::Mask::from_bits(bits);
+            assert_eq!((mask.bits(), mask.any(), mask.all()), (bits, bits != 0, bits == all));
+            assert_eq!((!mask).bits() & all, all & !bits);
+            assert_eq!(
+                ((mask & V::Mask::from_bits(1)).bits(), (mask | V::Mask::from_bits(1)).bits()),
+                (bits & 1, bits | 1)
+            );
+        }
+        let ascending: Vec<S> = (0..lanes).map(number).collect();
+        for count in 1..=lanes {
+            let ragged = V::load_ragged(&ascending[..count]);
+            assert!((0..lanes).all(|lane| ragged.extract(lane) == number(lane.min(count - 1))));
+            let mut stored = vec![number(77); count];
+            V::load(&ascending).store_ragged(&mut stored);
+            assert_eq!(stored, ascending[..count]);
+        }
+    }
+
+    struct Check;
+
+    impl Kernel for Check {
+        type Output = ();
+
+        #[inline(always)]
+        fn run<L: Level>(self) {
+            check::<f64, L::F64>();
+            check::<f32, L::F32>();
+        }
+    }
+
+    #[test]
+    fn lanes_of_all_levels_keep_their_places() {
+        check::<f64, f64>();
+        check::<f32, f32>();
+        for level in available() {
+            dispatch_at(level, Check).unwrap();
+        }
+    }
+}
