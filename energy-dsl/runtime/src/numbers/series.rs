@@ -566,4 +566,11 @@ mod tests {
             assert_eq!(size.to_scalar(), 3.0);
         }
     }
+
+    #[test]
+    fn more_terms_tell_more_of_open_series_only() {
+        assert!(Series::open().is_open() && matches!(Series::open().limit(), Limit::Open));
+        assert!(!Series::undefined().is_open() && matches!(Series::undefined().limit(), Limit::Unknown));
+        assert!(!Series::number(1.0).is_open());
+    }
 }
