@@ -149,6 +149,56 @@ fn elements_keep_their_numbers() {
 }
 
 #[test]
+fn general_paths_replace_the_results_that_need_them() {
+    let mut routines = Arc::unwrap_or_clone(routines());
+    let force = &mut routines.list[0];
+    // Where coordinate 2 is 0, all results are 2 times coordinate 3, and coordinate 4 below 0 is out of the domain.
+    force.tape.masks = 4;
+    force.tape.instructions.extend([instruction(Operation::Equal, 2, &[2, 8]), instruction(Operation::Not, 3, &[2])]);
+    let double = Tape {
+        slots: 4,
+        masks: 1,
+        constants: vec![(2, Constant::Number(0.0))],
+        truths: Vec::new(),
+        instructions: vec![instruction(Operation::Add, 3, &[0, 0]), instruction(Operation::Less, 0, &[1, 2])],
+    };
+    force.general = Some(General {
+        ordinary: 3,
+        inputs: vec![3, 4],
+        moves: vec![true; 2],
+        tape: double,
+        results: vec![3; RESULTS],
+        flags: [None; 2],
+        settled: [Some(0), None],
+        outside: None,
+        summed: RESULTS,
+    });
+    let same = [(Column::Same(&[2.0, 8.0][..]), 2)];
+    let elements = TapeElements::new(Arc::new(routines), COUNT, &[(Column::Same(&[0.5]), 1)], &same).unwrap();
+    let is_general = |element: usize| element % 50 == 7;
+    let coordinates = |element: usize| {
+        let mut x = coordinates(element).map(|x| x.abs() + 1.0);
+        x[2] = if is_general(element) { 0.0 } else { x[2] };
+        x[4] = if element >= 100 { -x[4] } else { x[4] };
+        x
+    };
+    let rows: Vec<f64> = (0..COUNT).flat_map(coordinates).collect();
+    let layout: Vec<u16> = (0..RESULTS as u16).collect();
+    let mut numbers = vec![0.0; COUNT * RESULTS];
+    let mut outputs = [Output { name: "forces", layout: &layout, numbers: &mut numbers }];
+    let flagged = elements.evaluate(RoutineKind::Force, 0..COUNT, Places::Rows(&rows), None, &mut outputs).unwrap();
+    for (element, row) in numbers.chunks(RESULTS).enumerate() {
+        let expected = match (is_general(element), coordinates(element)) {
+            (false, x) => std::array::from_fn(|result| 2.0 * x[result % 6] + 4.0),
+            (true, x) => [if x[4] < 0.0 { 0.0 } else { 2.0 * x[3] }; RESULTS],
+        };
+        assert_eq!(row, expected, "element {element}");
+    }
+    let flagged: Vec<usize> = flagged.into_iter().map(|(element, _)| element).collect();
+    assert_eq!(flagged, [107]);
+}
+
+#[test]
 fn the_first_degenerate_shape_is_named() {
     let made = |rests: &[f64], factor: f64| {
         let columns = [(Column::Same(&[1.0][..]), 1), (Column::Same(std::slice::from_ref(&factor)), 1)];

@@ -10,7 +10,7 @@ use crate::mesh::DisjointSets;
 /// The most vertices of a leaf.
 const LEAF: usize = 8;
 
-/// Returns the most comparisons of boxes and vertices for this many vertices. Meshes take about ten per vertex.
+/// Returns the most comparisons of boxes and vertices for this many vertices. Meshes take about 15 for each.
 pub(super) fn most_comparisons(vertices: usize) -> usize {
     1_000_000 + 100 * vertices
 }
