@@ -226,7 +226,7 @@ fn run_scalar<K: Kernel>(_name: LevelName, kernel: K) -> K::Output {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::numbers::{Lane, Mask, Number};
+    use crate::numbers::{BlockSum, Float, Lane, Mask, Number};
 
     /// Checks what moves numbers between lanes and slices, for one type of lanes.
     fn check<S: Number + Copy + PartialEq + std::fmt::Debug, V: Lane<S>>() {
@@ -288,6 +288,73 @@ mod tests {
         check::<f32, f32>();
         for level in available() {
             dispatch_at(level, Check).unwrap();
+        }
+    }
+
+    /// Checks that lanes have the bits of scalars.
+    fn compare<S: Float, L: Level>() {
+        let mut random = fastrand::Rng::with_seed(6);
+        for _ in 0..2_000 {
+            let mut draw = |spread: i32| {
+                let size = 2.0_f64.powi(random.i32(-spread..=spread));
+                S::Lanes::<L>::from_fn(|_| S::from_f64((2.0 * random.f64() - 1.0) * size))
+            };
+            let (a, b, c, large) = (draw(4), draw(4), draw(4), draw(40));
+            macro_rules! same {
+                ($($function:ident $(::<$level:ident>)? ($x:ident $(, $y:ident)*))*) => {
+                    $(let wide = $x.$function$(::<$level>)?($($y),*);
+                    for lane in 0..<S::Lanes<L> as Lane<S>>::LANES {
+                        let alone = $x.extract(lane).$function$(::<$level>)?($($y.extract(lane)),*);
+                        let is_same = |number: S| number.equal(alone).all() || !alone.equal(alone).all();
+                        assert!(is_same(wide.extract(lane)), "{} at {}", stringify!($function), L::NAME);
+                    })*
+                };
+            }
+            same! {
+                sqrt(a) abs(a) min(a, b) max(a, b) sin::<L>(a) cos::<L>(a) sin::<L>(large) cos::<L>(large) exp::<L>(a)
+                ln::<L>(a) ln::<L>(large) atan2::<L>(a, b) atan2::<L>(large, b) powf::<L>(a, b) mul_add::<L>(a, b, c)
+                fused_mul_sub::<L>(a, b, c) sum_error(a, large) difference_error(a, large) product_error::<L>(a, b)
+                root_error::<L>(a, b) power_of_two_scale(large)
+            }
+        }
+    }
+
+    /// Checks that running sums have the bits of sums of numbers.
+    fn add_blocks<S: Float, L: Level, B: BlockSum<S>>() {
+        let mut random = fastrand::Rng::with_seed(7);
+        let mut draw = || S::from_f64(2.0 * random.f64() - 1.0);
+        let (mut sum, mut expected) = (B::zero(), Rows::<S, L>::zero());
+        for _ in 0..10 {
+            let mut block = [S::from_f64(0.0); 16];
+            block.iter_mut().for_each(|number| *number = draw());
+            let vector = [draw(), draw(), draw(), S::from_f64(0.0)];
+            sum.add(&block, &vector);
+            expected.add(&block, &vector);
+            assert!((0..3).all(|row| sum.total()[row].equal(expected.total()[row]).all()), "{}", L::NAME);
+            let from = [draw(), draw(), draw(), S::from_f64(0.0)];
+            let (found, expected) = (B::less(from, &block, &vector), Rows::<S, L>::less(from, &block, &vector));
+            assert!((0..3).all(|row| found[row].equal(expected[row]).all()), "{}", L::NAME);
+        }
+    }
+
+    struct Compare;
+
+    impl Kernel for Compare {
+        type Output = ();
+
+        #[inline(always)]
+        fn run<L: Level>(self) {
+            compare::<f64, L>();
+            compare::<f32, L>();
+            add_blocks::<f64, L, L::Sum64>();
+            add_blocks::<f32, L, L::Sum32>();
+        }
+    }
+
+    #[test]
+    fn lanes_of_all_levels_have_the_bits_of_scalars() {
+        for level in available() {
+            dispatch_at(level, Compare).unwrap();
         }
     }
 }
