@@ -61,3 +61,23 @@ impl<S: Clone> Clone for Aligned<S> {
         Self::from(&**self)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::Aligned;
+
+    fn starts_at_a_line<S: Copy + PartialEq + std::fmt::Debug>(number: S) {
+        for count in 0..100 {
+            let all = Aligned::new(count, number);
+            assert_eq!(*all, vec![number; count]);
+            assert!(count == 0 || all.as_ptr() as usize % 64 == 0 && all.clone().as_ptr() as usize % 64 == 0);
+        }
+    }
+
+    #[test]
+    fn numbers_start_at_a_cache_line() {
+        starts_at_a_line(1.0_f64);
+        starts_at_a_line(1.0_f32);
+        starts_at_a_line(1_u8);
+    }
+}

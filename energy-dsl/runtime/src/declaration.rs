@@ -177,3 +177,24 @@ pub struct Declaration {
     /// Routines and their costs.
     pub routines: Cow<'static, [Routine]>,
 }
+
+#[cfg(test)]
+mod tests {
+    use super::OperationCount;
+
+    #[test]
+    fn counts_add_up() {
+        let count = OperationCount {
+            basic: 1,
+            fused: 20,
+            divisions_and_roots: 300,
+            transcendental: 4_000,
+            error_terms: 50_000,
+        };
+        assert_eq!(count.instructions(), 54_321);
+        assert_eq!(count.total(), 54_341);
+        assert_eq!(count.cost(), 1 + 20 + 5 * 300 + 20 * 4_000 + 3 * 50_000);
+        let OperationCount { basic, fused, divisions_and_roots, transcendental, error_terms } = count.times(3);
+        assert_eq!((basic, fused, divisions_and_roots, transcendental, error_terms), (3, 60, 900, 12_000, 150_000));
+    }
+}

@@ -124,3 +124,33 @@ impl<T: Number + Scalar, Rows: Array<T>, Jacobian: Array<T>> ResidualJacobian<T,
         DMatrix::from_row_slice(rows, self.jacobian.as_ref().len() / rows, self.jacobian.as_ref())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::numbers::Flags;
+
+    #[test]
+    fn entries_keep_their_places() {
+        // Numbers tell point, other point, row and column.
+        let block = |i: usize, j: usize| [0, 1, 2].map(|r| [0, 1, 2].map(|c| (1000 * i + 100 * j + 10 * r + c) as f64));
+        let blocks = [block(0, 0), block(0, 1), block(1, 0), block(1, 1)];
+        let (force, flags) = ([[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]], Flags::clear());
+        let by_velocity = blocks.map(|block| block.map(|row| row.map(|x: f64| -x)));
+        let jacobians = ForceJacobians { force, by_position: blocks, by_velocity, flags };
+        let expected = |row: usize, column: usize| block(row / 3, column / 3)[row % 3][column % 3];
+        assert_eq!(jacobians.by_position_matrix(), DMatrix::from_fn(6, 6, expected));
+        assert_eq!(jacobians.by_velocity_matrix(), -DMatrix::from_fn(6, 6, expected));
+        assert_eq!(jacobians.force_vector(), DVector::from_iterator(6, (1..=6).map(f64::from)));
+        let triangle = [block(0, 0), block(0, 1), block(1, 1)];
+        let hessian = Hessian { value: 0.0, gradient: force, hessian: triangle, flags };
+        let below = |row: usize, column: usize| {
+            if row / 3 > column / 3 { expected(column, row) } else { expected(row, column) }
+        };
+        assert_eq!(hessian.hessian_matrix(), DMatrix::from_fn(6, 6, below));
+        assert_eq!(hessian.gradient_vector(), jacobians.force_vector());
+        let residual = ResidualJacobian { value: [1.0, 2.0], jacobian: [1.0, 2.0, 3.0, 4.0, 5.0, 6.0], flags };
+        assert_eq!(residual.jacobian_matrix(), DMatrix::from_row_slice(2, 3, &[1.0, 2.0, 3.0, 4.0, 5.0, 6.0]));
+        assert_eq!(residual.residual_vector().as_slice(), [1.0, 2.0]);
+    }
+}

@@ -1,4 +1,4 @@
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use mesh_io::obj::{ObjFile, ObjFileError};
@@ -95,11 +95,11 @@ pub fn read_makehuman(mesh: &Path, rig: &Path, weights: &Path) -> Result<Skinned
     let bones = read_bones(rig, &groups)?;
     let file: WeightFile = read_json(weights)?;
     let mut by_vertex = vec![Vec::new(); groups.positions.len()];
+    let numbers: BTreeMap<&str, usize> = bones.iter().map(|bone| bone.name.as_str()).zip(0..).collect();
     for (name, list) in &file.weights {
         let unknown = |message| MakeHumanError::Unknown { path: weights.to_owned(), message };
-        let bone = bones
-            .iter()
-            .position(|bone| bone.name == *name)
+        let bone = *numbers
+            .get(name.as_str())
             .ok_or_else(|| unknown(format!("weights for bone `{name}`, which the rig does not have")))?;
         for &(vertex, weight) in list {
             let row = by_vertex.get_mut(vertex);
@@ -168,38 +168,53 @@ impl Groups {
 fn read_bones(path: &Path, groups: &Groups) -> Result<Vec<Bone>, MakeHumanError> {
     let rig: BTreeMap<String, RigBone> = read_json(path)?;
     let unknown = |message| MakeHumanError::Unknown { path: path.to_owned(), message };
-    let mut bones: Vec<Bone> = Vec::with_capacity(rig.len());
-    while bones.len() < rig.len() {
-        let before = bones.len();
-        for (name, bone) in &rig {
-            if bones.iter().any(|known| known.name == *name) {
-                continue;
-            }
-            let parent = bones.iter().position(|known| known.name == bone.parent);
-            if parent.is_none() && !bone.parent.is_empty() {
-                continue;
-            }
-            let end = |place: &Place| -> Result<[f64; 3], MakeHumanError> {
-                let found = match place {
-                    Place::Cube { cube_name } => groups.mean(distinct(groups.group(cube_name, name)?).into_iter()),
-                    Place::Mean { vertex_indices } => groups.mean(vertex_indices.iter().copied()),
-                    Place::Vertex { vertex_index } => groups.mean([*vertex_index].into_iter()),
-                };
-                found
-                    .map(Into::into)
-                    .ok_or_else(|| unknown(format!("bone `{name}` ends at vertices that do not exist")))
+    let order = parents_first(&rig).map_err(|lost| {
+        let parent = &rig[lost].parent;
+        unknown(format!("bone `{lost}`: its parent `{parent}` is missing or one of its descendants"))
+    })?;
+    let numbers: BTreeMap<&str, usize> = order.iter().copied().zip(0..).collect();
+    // Many bones may name one large group.
+    let mut centres = BTreeMap::<String, Option<Vector3<f64>>>::new();
+    let mut bones = Vec::with_capacity(order.len());
+    for name in order {
+        let RigBone { parent, head, tail } = &rig[name];
+        let mut end = |place: &Place| -> Result<[f64; 3], MakeHumanError> {
+            let found = match place {
+                Place::Cube { cube_name } => match centres.get(cube_name) {
+                    Some(&centre) => centre,
+                    None => {
+                        let centre = groups.mean(distinct(groups.group(cube_name, name)?).into_iter());
+                        centres.insert(cube_name.clone(), centre);
+                        centre
+                    }
+                },
+                Place::Mean { vertex_indices } => groups.mean(vertex_indices.iter().copied()),
+                Place::Vertex { vertex_index } => groups.mean([*vertex_index].into_iter()),
             };
-            bones.push(Bone { name: name.clone(), parent, head: end(&bone.head)?, tail: end(&bone.tail)? });
-        }
-        if bones.len() == before {
-            let lost = rig.keys().find(|name| bones.iter().all(|bone| bone.name != **name)).expect("one is missing");
-            return Err(unknown(format!(
-                "bone `{lost}`: its parent `{}` is missing or one of its descendants",
-                rig[lost].parent
-            )));
-        }
+            found.map(Into::into).ok_or_else(|| unknown(format!("bone `{name}` ends at vertices that do not exist")))
+        };
+        let parent = numbers.get(parent.as_str()).copied().filter(|_| !parent.is_empty());
+        bones.push(Bone { name: name.to_owned(), parent, head: end(head)?, tail: end(tail)? });
     }
     Ok(bones)
+}
+
+/// Returns the names of all bones, parents first. If the parent of a bone is missing or one of its descendants, returns
+/// the name of the first such bone instead.
+fn parents_first(rig: &BTreeMap<String, RigBone>) -> Result<Vec<&str>, &str> {
+    let mut children = BTreeMap::<&str, Vec<&str>>::new();
+    rig.iter().for_each(|(name, bone)| children.entry(&bone.parent).or_default().push(name));
+    // Bones are listed in rounds, each in alphabetical order. A child that comes before its parent in this order waits
+    // for the next round.
+    let mut ready: BTreeSet<(usize, &str)> = children.remove("").into_iter().flatten().map(|name| (0, name)).collect();
+    let mut order = Vec::with_capacity(rig.len());
+    while let Some((round, name)) = ready.pop_first() {
+        order.push(name);
+        let children = children.remove(name).into_iter().flatten();
+        ready.extend(children.map(|child| (round + usize::from(child < name), child)));
+    }
+    let listed: BTreeSet<&str> = order.iter().copied().collect();
+    rig.keys().map(String::as_str).find(|name| !listed.contains(name)).map_or(Ok(order), Err)
 }
 
 fn distinct(polygons: impl Iterator<Item = Vec<usize>>) -> Vec<usize> {
@@ -207,4 +222,56 @@ fn distinct(polygons: impl Iterator<Item = Vec<usize>>) -> Vec<usize> {
     vertices.sort_unstable();
     vertices.dedup();
     vertices
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Reads the bones of a rig and a mesh.
+    fn bones(rig: &str, mesh: &str) -> Result<Vec<Bone>, String> {
+        let folder = tempfile::tempdir().unwrap();
+        let [rig_file, mesh_file] = ["rig.json", "base.obj"].map(|name| folder.path().join(name));
+        std::fs::write(&rig_file, rig).unwrap();
+        std::fs::write(&mesh_file, mesh).unwrap();
+        read_bones(&rig_file, &Groups::read(&mesh_file).unwrap()).map_err(|error| error.to_string())
+    }
+
+    /// Returns a rig of bones with parents; their heads are the centre of a group, their tails a vertex.
+    fn rig<'a>(bones: impl IntoIterator<Item = (&'a str, &'a str)>) -> String {
+        let bone = |(name, parent)| {
+            let head = r#""head": {"strategy": "CUBE", "cube_name": "all"}"#;
+            let tail = r#""tail": {"strategy": "VERTEX", "vertex_index": 0}"#;
+            format!(r#""{name}": {{"parent": "{parent}", {head}, {tail}}}"#)
+        };
+        format!("{{{}}}", bones.into_iter().map(bone).collect::<Vec<_>>().join(","))
+    }
+
+    const TRIANGLE: &str = "v 0 0 0\nv 30 0 0\nv 0 30 0\ng all\nf 1 2 3\n";
+
+    #[test]
+    fn parents_come_first() {
+        let text = rig([("b", "c"), ("c", ""), ("d", "c"), ("a", "b"), ("e", "")]);
+        let read = bones(&text, TRIANGLE).unwrap();
+        let found: Vec<_> = read.iter().map(|bone| (bone.name.as_str(), bone.parent)).collect();
+        assert_eq!(found, [("c", None), ("d", Some(0)), ("e", None), ("b", Some(0)), ("a", Some(3))]);
+        assert_eq!((read[0].head, read[0].tail), ([1.0, 1.0, 0.0], [0.0; 3]));
+        for bones_with_parents in [[("a", ""), ("b", "x")], [("a", ""), ("b", "b")], [("b", "c"), ("c", "b")]] {
+            let message = bones(&rig(bones_with_parents), TRIANGLE).unwrap_err();
+            assert!(message.contains("bone `b`: its parent `"), "{message}");
+            assert!(message.ends_with("is missing or one of its descendants"), "{message}");
+        }
+    }
+
+    #[test]
+    fn large_rigs_take_linear_time() {
+        // Each bone but the last waits for its parent, and all name one group. Time that grows with the square of the
+        // bones, or with bones times faces, would be hours.
+        let names: Vec<String> = (0..20_000).map(|number| format!("{number:05}")).collect();
+        let parents = names[1..].iter().map(String::as_str).chain([""]);
+        let text = rig(names.iter().map(String::as_str).zip(parents));
+        let mesh = format!("{TRIANGLE}{}", "f 1 2 3\n".repeat(100_000));
+        let read = bones(&text, &mesh).unwrap();
+        assert_eq!((read.len(), read[0].name.as_str(), read[1].parent), (20_000, "19999", Some(0)));
+    }
 }

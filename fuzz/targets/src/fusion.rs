@@ -4,6 +4,7 @@ use std::cell::RefCell;
 use std::path::Path;
 use std::sync::LazyLock;
 
+use cloth_core::physics::mesh::{ObjOptions, read_obj_surface};
 use fusion_core::body::{Bone, SkinnedBody, figure, parse_gltf, read_body, read_makehuman, read_obj};
 use fusion_core::depth::{Camera, DepthImage, DepthSequence, PixelRays, read_depth, read_mask, write_depth};
 use fusion_core::model::{DeformationModel, ModelOptions};
@@ -138,6 +139,11 @@ fn obj(input: &[u8], folder: &Path) -> Result<(), String> {
     let cloth = cloth_core::physics::mesh::read_obj(&path).map_err(message).map(|mesh| {
         assert!(mesh.triangles().iter().flatten().all(|&vertex| vertex < mesh.vertices().len()));
     });
+    let mut options = ObjOptions::default();
+    options.weld = Some(1e-3);
+    if let Ok(surface) = read_obj_surface(&path, options) {
+        assert!(surface.kept.iter().all(|&triangle| triangle < surface.unwelded_triangles));
+    }
     match read_obj(&path) {
         Ok(body) => checked(&body),
         Err(error) => cloth.and(Err(message(error))),

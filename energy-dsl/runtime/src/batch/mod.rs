@@ -9,6 +9,8 @@ mod forces;
 mod packed;
 mod potentials;
 mod residuals;
+#[cfg(test)]
+mod tests;
 
 pub use error::{BatchError, Flagged};
 pub use packed::{BLOCK, Packed, PackedForce, PackedPotential, PackedResidual, Stored, WidePoints};

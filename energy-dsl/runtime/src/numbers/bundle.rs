@@ -524,3 +524,31 @@ impl Bundle {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn term(power: f64, is_exact: bool) -> Rows {
+        let order = Order { power, logs: 0.0 };
+        Rows::new(order, &[Coefficients::exact([1.0; LANES])], is_exact).unwrap()
+    }
+
+    #[test]
+    fn parts_beyond_the_first_unknown_term_are_dropped() {
+        // 1 + unknown terms from ε on.
+        let unsure = term(0.0, false);
+        for (power, parts) in [(-0.5, 2), (0.5, 2), (1.5, 1), (20.5, 1)] {
+            let mut sum = Sum::of(unsure, Undefined::surely(Outcomes::NONE));
+            sum.add(&term(power, true), 1.0).unwrap();
+            assert_eq!(sum.parts().count(), parts, "power {power}");
+            assert!(sum.parts().all(|part| !part.is_zero() && part.exceeds(Order { power: 1.0, logs: 0.0 })));
+        }
+        // A series whose first unknown term is the sum's is kept without terms, too.
+        let mut sum = Sum::of(term(0.25, true), Undefined::surely(Outcomes::NONE));
+        sum.add(&unsure, 1.0).unwrap();
+        sum.add(&unsure, -1.0).unwrap();
+        assert_eq!((sum.parts().count(), sum.end().power), (2, 1.0));
+        assert!(Sum::of(term(0.25, true), Undefined::surely(Outcomes::NONE)).single().is_some());
+    }
+}

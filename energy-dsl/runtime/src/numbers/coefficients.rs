@@ -386,3 +386,49 @@ impl List {
         Self::filled(self.len(), copy).0
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn of(factor: f64, size: f64) -> Coefficients {
+        Coefficients { factors: [factor; LANES], sizes: [size; LANES] }
+    }
+
+    fn first(of: &Coefficients) -> (f64, f64) {
+        (of.factors[0], of.sizes[0])
+    }
+
+    #[test]
+    fn sizes_are_those_of_the_largest_terms() {
+        let mut product = of(-2.0, 8.0);
+        product.multiply(&of(4.0, 4.0));
+        assert_eq!(first(&product), (-8.0, 32.0));
+        product.multiply(&of(0.5, 16.0));
+        assert_eq!(first(&product), (-4.0, 128.0));
+        product.divide(&of(-2.0, 2.0));
+        assert_eq!(first(&product), (2.0, 64.0));
+        product.divide(&of(4.0, 256.0));
+        assert_eq!(first(&product), (0.5, 32.0));
+        product.divide(&of(0.0, 0.0));
+        assert_eq!(first(&product), (0.0, 0.0));
+        let mut sum = of(1.0, 1.0);
+        sum.add_product(-3.0, &of(2.0, 8.0), &of(5.0, 6.0));
+        assert_eq!(first(&sum), (-29.0, 120.0));
+        sum.add(-2.0, &of(3.0, 100.0));
+        assert_eq!(first(&sum), (-35.0, 200.0));
+        sum.scale(-2.0);
+        assert_eq!(first(&sum), (70.0, 400.0));
+        assert_eq!(first(&of(-2.0, 8.0).of_function(|x| x * x)), (4.0, 16.0));
+    }
+
+    #[test]
+    fn sums_that_cancel_are_0() {
+        let mut sum = of(1e-3, 1e10);
+        sum.drop_cancelled();
+        assert_eq!(first(&sum), (0.0, 0.0));
+        let mut sum = of(-1.0, 1e10);
+        sum.drop_cancelled();
+        assert_eq!(first(&sum), (-1.0, 1e10));
+    }
+}

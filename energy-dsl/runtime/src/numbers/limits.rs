@@ -596,4 +596,37 @@ mod tests {
         assert_eq!(settled(Care { outside: true, ..care }, false), [0.0; 3]);
         assert_eq!(settled(Care { definite: true, ..care }, true), [0.0; 3]);
     }
+
+    #[test]
+    fn results_that_are_nearly_the_limit_stay() {
+        let is_kept = |rounding: Rounding, plain: f64, limit: f64, scale: f64| {
+            rounding.nearest(Unbounded::of(plain), Unbounded::of(limit), Unbounded::of(scale)).to_scalar() == plain
+        };
+        let (single, double) = (Rounding::of::<f32>(), Rounding::of::<f64>());
+        assert!(is_kept(single, 0.9e-5, 0.0, 1.0) && !is_kept(single, 1.1e-5, 0.0, 1.0));
+        assert!(is_kept(single, 1.0009, 1.0, 0.0) && !is_kept(single, 1.0011, 1.0, 0.0));
+        assert!(is_kept(double, 0.9e-13, 0.0, 1.0) && !is_kept(double, 1.1e-13, 0.0, 1.0));
+        assert!(is_kept(double, 1.0 + 0.9e-8, 1.0, 0.0) && !is_kept(double, 1.0 + 1.1e-8, 1.0, 0.0));
+    }
+
+    #[test]
+    fn slopes_are_fixed_and_different() {
+        // Limits along other rays may be rounded differently: results would change from version to version.
+        let expected = [-0.912_483_106_160_231_9, -0.635_638_733_888_018_5, -0.578_857_186_237_408_3];
+        assert_eq!([slope(0, 0), slope(7, 3), slope(20, 1)], expected);
+        let mut sizes = Vec::new();
+        for ray in 0..MANY {
+            for input in 0..50 {
+                let own = slope(ray, input);
+                assert!((0.25..=1.0).contains(&own.abs()));
+                if ray < FEW && ray % 2 == 1 {
+                    assert_eq!(own, -slope(ray - 1, input));
+                } else {
+                    sizes.push(own.abs());
+                }
+            }
+        }
+        sizes.sort_by(f64::total_cmp);
+        assert!(sizes.windows(2).all(|pair| pair[0] < pair[1]));
+    }
 }

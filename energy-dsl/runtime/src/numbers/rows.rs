@@ -361,3 +361,36 @@ fn power(x: f64, exponent: f64) -> f64 {
     };
     if x < 0.0 && exponent % 2.0 != 0.0 { -size } else { size }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn constant(x: f64) -> Rows {
+        Rows::constant([x; LANES]).unwrap()
+    }
+
+    fn value(of: Option<Rows>) -> f64 {
+        of.unwrap().as_constant(LANES).expect("a constant")
+    }
+
+    #[test]
+    fn functions_of_constants_are_constants() {
+        assert_eq!(value(Rows::zero().exp()), 1.0);
+        assert_eq!(value(constant(1.0).exp()), Number::exp::<Baseline>(1.0));
+        for x in [0.5, 1.0, 2.0, -3.0] {
+            let [sine, cosine] = constant(x).sin_cos().unwrap();
+            assert_eq!((value(Some(sine)), value(Some(cosine))), (x.sin(), x.cos()));
+        }
+    }
+
+    #[test]
+    fn sines_and_cosines_vanish_at_their_zeros() {
+        use std::f64::consts::{FRAC_PI_2, PI};
+        for (x, expected) in [(FRAC_PI_2, [1.0, 0.0]), (-FRAC_PI_2, [-1.0, 0.0]), (PI, [0.0, -1.0])] {
+            assert_eq!(constant(x).sin_cos().unwrap().map(|part| value(Some(part))), expected);
+        }
+        // A small number is not the rounding error of a zero.
+        assert_eq!(value(constant(1e-15).sin_cos().map(|[sine, _]| sine)), 1e-15);
+    }
+}

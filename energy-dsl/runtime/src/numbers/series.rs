@@ -554,3 +554,23 @@ impl Limit {
         Self::Finite(factor(0.0), 1.0)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sizes_have_no_sign() {
+        for x in [-3.0, 3.0] {
+            let Limit::Finite(size, _) = Series::number(x).abs().limit() else { panic!("a number has a limit") };
+            assert_eq!(size.to_scalar(), 3.0);
+        }
+    }
+
+    #[test]
+    fn more_terms_tell_more_of_open_series_only() {
+        assert!(Series::open().is_open() && matches!(Series::open().limit(), Limit::Open));
+        assert!(!Series::undefined().is_open() && matches!(Series::undefined().limit(), Limit::Unknown));
+        assert!(!Series::number(1.0).is_open());
+    }
+}

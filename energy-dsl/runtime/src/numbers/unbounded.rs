@@ -484,6 +484,7 @@ pub(crate) fn doubles<T: Number>(numbers: &[T], nearest: &mut [f64]) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::numbers::Lane;
     use crate::numbers::level::Baseline;
 
     fn of<S: Scalar>(value: S) -> Unbounded<S> {
@@ -547,6 +548,9 @@ mod tests {
         let tiny = of(-1000.0).exp::<Baseline>();
         assert_eq!(tiny.to_scalar(), 0.0);
         assert!(((tiny * of(500.0).exp::<Baseline>()).to_scalar() / (-500.0_f64).exp() - 1.0).abs() < 1e-13);
+        // Beyond 2²⁵, eˣ is 0 or infinite: x has too few bits after the point.
+        let both = |x: f64| (of(-x).exp::<Baseline>() * of(x).exp::<Baseline>()).to_scalar();
+        assert!((both(3.3e7) - 1.0).abs() < 1e-6 && both(3.4e7).is_nan());
     }
 
     #[test]
@@ -571,5 +575,41 @@ mod tests {
         assert!(f64::is_nan((of(0.0) / of(0.0)).to_scalar()));
         assert_eq!((of(1.0) / of(0.0)).to_scalar(), f64::INFINITY);
         assert_eq!((of(f64::INFINITY) + of(1e-300)).to_scalar(), f64::INFINITY);
+    }
+
+    /// x², with a documented value and a flag at 1.
+    struct Square;
+
+    static SQUARE: Precautions<1, 1> = Precautions::of::<Square>();
+
+    impl WithCare<1, 1> for Square {
+        const ROLES: Roles<'static> = Roles { moves: &[true], groups: &[1], values_first: true, is_energy: true };
+
+        fn run_at<T: Real, L: Level>(&[x]: &[T; 1]) -> ([T; 1], Care<T>) {
+            let definite = x.equal(T::from_f64(1.0));
+            ([x * x], Care { flags: Flags::clear(), outside: T::Mask::none(), definite })
+        }
+
+        fn is_outside_at<T: Real, L: Level>(&[x]: &[T; 1]) -> T::Mask {
+            x.less(T::from_f64(0.0))
+        }
+
+        fn compiled() -> &'static Precautions<1, 1> {
+            &SQUARE
+        }
+    }
+
+    #[test]
+    fn general_paths_run_in_the_lanes_that_need_them() {
+        type Wide = <Baseline as Level>::F64;
+        let run = |x: [f64; 2], lanes: u32| {
+            let lanes = <Wide as Number>::Mask::from_bits(lanes);
+            let ([squares], flags) = with_care::<Square, Wide, 1, 1>(&[Wide::load(&x)], lanes, 1);
+            ([0, 1].map(|lane| squares.extract(lane)), flags.degenerate.bits(), flags.kink.bits())
+        };
+        assert_eq!(run([2.0, 3.0], 0b11), ([4.0, 9.0], 0, 0));
+        assert_eq!(run([2.0, 3.0], 0b10), ([0.0, 9.0], 0, 0));
+        assert_eq!(run([2.0, 1.0], 0b11), ([4.0, 1.0], 0b10, 0));
+        assert_eq!(run([-2.0, 3.0], 0b11), ([f64::INFINITY, 9.0], 0b01, 0));
     }
 }

@@ -17,6 +17,8 @@ mod routine;
 mod runner;
 mod scalar;
 mod slots;
+#[cfg(test)]
+mod tests;
 
 pub use evaluate::{BlockResults, Expander, Output};
 pub use instruction::{Constant, Instruction, Tape};

@@ -3,10 +3,8 @@
 mod weld;
 
 use std::borrow::Cow;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap};
 use std::path::{Path, PathBuf};
-
-use energy_dsl::Vector3;
 
 use energy_files::excerpt;
 use mesh_io::obj::{Corner, Face, ObjFile, ObjFileError};
@@ -31,6 +29,18 @@ pub enum ObjError {
         name: String,
         /// The names in the file.
         known: Vec<String>,
+    },
+    /// Too many vertices lie just over the distance of welding apart.
+    #[error(
+        "{}: welding up to {distance} m takes more than {} comparisons, because too many vertices lie just over that \
+         distance apart; choose another distance", .path.display(), weld::most_comparisons(*.vertices)
+    )]
+    Weld {
+        path: PathBuf,
+        /// In m.
+        distance: f64,
+        /// Number of vertices that faces use.
+        vertices: usize,
     },
     /// The mesh is invalid.
     #[error("{}{}: {source}", .path.display(), .line.map(|line| format!(":{line}")).unwrap_or_default())]
@@ -90,19 +100,25 @@ pub fn read_obj_surface(path: &Path, options: ObjOptions<'_>) -> Result<ObjSurfa
 
 fn surface(file: &ObjFile, path: &Path, options: ObjOptions<'_>) -> Result<ObjSurface, ObjError> {
     let faces = chosen_faces(file, path, options.groups)?;
-    Triangulation::new(file, faces, options.weld).surface(path)
+    let mut triangulation = Triangulation::new(file, faces);
+    if let Some(distance) = options.weld {
+        let vertices = triangulation.sources.len();
+        triangulation.weld(distance).ok_or_else(|| ObjError::Weld { path: path.to_owned(), distance, vertices })?;
+    }
+    triangulation.surface(path)
 }
 
 /// Returns the faces of the groups.
 fn chosen_faces<'a>(file: &'a ObjFile, path: &Path, groups: Option<&[String]>) -> Result<Cow<'a, [Face]>, ObjError> {
     let Some(groups) = groups else { return Ok(Cow::Borrowed(&file.faces)) };
-    let number = |name: &String| {
+    let numbers: HashMap<&String, usize> = file.names.iter().zip(0..).collect();
+    let mut wanted = vec![false; file.names.len()];
+    for name in groups {
         let unknown =
             || ObjError::UnknownGroup { path: path.to_owned(), name: name.clone(), known: file.names.clone() };
-        file.names.iter().position(|known| known == name).map(|number| number as u32).ok_or_else(unknown)
-    };
-    let wanted: Vec<u32> = groups.iter().map(number).collect::<Result<_, _>>()?;
-    let is_wanted = |face: &Face| file.groups(*face).iter().any(|group| wanted.contains(group));
+        wanted[*numbers.get(name).ok_or_else(unknown)?] = true;
+    }
+    let is_wanted = |face: &Face| file.groups(*face).iter().any(|&group| wanted[group as usize]);
     Ok(file.faces.iter().copied().filter(is_wanted).collect())
 }
 
@@ -135,27 +151,30 @@ struct Part {
 const UNUSED: u32 = u32::MAX;
 
 impl<'a> Triangulation<'a> {
-    fn new(file: &'a ObjFile, faces: Cow<'a, [Face]>, weld: Option<f64>) -> Self {
+    fn new(file: &'a ObjFile, faces: Cow<'a, [Face]>) -> Self {
         let mut number = vec![UNUSED; file.vertices.len()];
         faces.iter().flat_map(|face| file.corners(*face)).for_each(|corner| number[corner.vertex()] = 0);
-        let mut sources: Vec<u32> = (0..number.len() as u32).filter(|&v| number[v as usize] != UNUSED).collect();
-        let used = sources.len();
+        let sources: Vec<u32> = (0..number.len() as u32).filter(|&v| number[v as usize] != UNUSED).collect();
         sources.iter().enumerate().for_each(|(place, &vertex)| number[vertex as usize] = place as u32);
-        if let Some(distance) = weld {
-            let positions: Vec<Vector3<f64>> = sources.iter().map(|&vertex| file.vertices[vertex as usize]).collect();
-            let first = weld::welded(&positions, distance);
-            let all = std::mem::take(&mut sources);
-            // The first of the merged vertices comes before the others, and has its number by then.
-            for (place, &vertex) in all.iter().enumerate() {
-                number[vertex as usize] = number[all[first[place]] as usize];
-                if first[place] == place {
-                    number[vertex as usize] = sources.len() as u32;
-                    sources.push(vertex);
-                }
+        Self { file, faces, sources, number, is_welded: false, welded: 0 }
+    }
+
+    /// Merges vertices up to a distance, in m. Returns `None` if that takes too many comparisons.
+    fn weld(&mut self, distance: f64) -> Option<()> {
+        let positions: Vec<_> = self.sources.iter().map(|&vertex| self.file.vertices[vertex as usize]).collect();
+        let first = weld::welded(&positions, distance)?;
+        let all = std::mem::take(&mut self.sources);
+        // The first of the merged vertices comes before the others, and has its number by then.
+        for (place, &vertex) in all.iter().enumerate() {
+            self.number[vertex as usize] = self.number[all[first[place]] as usize];
+            if first[place] == place {
+                self.number[vertex as usize] = self.sources.len() as u32;
+                self.sources.push(vertex);
             }
         }
-        let welded = used - sources.len();
-        Self { file, faces, sources, number, is_welded: weld.is_some(), welded }
+        self.is_welded = true;
+        self.welded = all.len() - self.sources.len();
+        Some(())
     }
 
     /// Returns the triangles that welding has not closed.

@@ -222,3 +222,139 @@ fn run_at<K: Kernel>(_name: LevelName, kernel: K) -> K::Output {
 fn run_scalar<K: Kernel>(_name: LevelName, kernel: K) -> K::Output {
     kernel.run::<Baseline>()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::numbers::{BlockSum, Float, Lane, Mask, Number};
+
+    /// Checks what moves numbers between lanes and slices, for one type of lanes.
+    fn check<S: Number + Copy + PartialEq + std::fmt::Debug, V: Lane<S>>() {
+        let number = |number: usize| S::from_f64(number as f64);
+        let lanes = V::LANES;
+        for rows in 1..20 {
+            let wide: Vec<V> = (0..rows).map(|row| V::from_fn(|lane| number(100 * lane + row))).collect();
+            for (count, stride) in [(lanes, rows), (lanes, rows + 3), (lanes - 1, rows + 1), (1, rows), (0, rows)] {
+                let mut out = vec![number(9_999); lanes * stride];
+                V::store_transposed(&wide, count, &mut out, stride);
+                for (place, &found) in out.iter().enumerate() {
+                    let (lane, row) = (place / stride, place % stride);
+                    let is_written = lane < count && row < rows;
+                    assert_eq!(found, if is_written { number(100 * lane + row) } else { number(9_999) });
+                }
+            }
+        }
+        let points: Vec<[S; 3]> = (0..40).map(|at| [0, 1, 2].map(|axis| number(10 * at + axis))).collect();
+        let indices: Vec<u32> = (0..lanes as u32).map(|lane| (7 * lane + 3) % 40).collect();
+        for (axis, gathered) in V::gather(&points, &indices).into_iter().enumerate() {
+            assert!((0..lanes).all(|lane| gathered.extract(lane) == points[indices[lane] as usize][axis]));
+        }
+        let all = (1 << lanes) - 1;
+        assert_eq!((V::Mask::none().bits(), (!V::Mask::none()).bits() & all), (0, all));
+        for bits in [0, all, 1, 0b10 & all, 1 << (lanes - 1)] {
+            let mask = V::Mask::from_bits(bits);
+            assert_eq!((mask.bits(), mask.any(), mask.all()), (bits, bits != 0, bits == all));
+            assert_eq!((!mask).bits() & all, all & !bits);
+            assert_eq!(
+                ((mask & V::Mask::from_bits(1)).bits(), (mask | V::Mask::from_bits(1)).bits()),
+                (bits & 1, bits | 1)
+            );
+        }
+        let ascending: Vec<S> = (0..lanes).map(number).collect();
+        for count in 1..=lanes {
+            let ragged = V::load_ragged(&ascending[..count]);
+            assert!((0..lanes).all(|lane| ragged.extract(lane) == number(lane.min(count - 1))));
+            let mut stored = vec![number(77); count];
+            V::load(&ascending).store_ragged(&mut stored);
+            assert_eq!(stored, ascending[..count]);
+        }
+    }
+
+    struct Check;
+
+    impl Kernel for Check {
+        type Output = ();
+
+        #[inline(always)]
+        fn run<L: Level>(self) {
+            check::<f64, L::F64>();
+            check::<f32, L::F32>();
+        }
+    }
+
+    #[test]
+    fn lanes_of_all_levels_keep_their_places() {
+        check::<f64, f64>();
+        check::<f32, f32>();
+        for level in available() {
+            dispatch_at(level, Check).unwrap();
+        }
+    }
+
+    /// Checks that lanes have the bits of scalars.
+    fn compare<S: Float, L: Level>() {
+        let mut random = fastrand::Rng::with_seed(6);
+        for _ in 0..2_000 {
+            let mut draw = |spread: i32| {
+                let size = 2.0_f64.powi(random.i32(-spread..=spread));
+                S::Lanes::<L>::from_fn(|_| S::from_f64((2.0 * random.f64() - 1.0) * size))
+            };
+            let (a, b, c, large) = (draw(4), draw(4), draw(4), draw(40));
+            macro_rules! same {
+                ($($function:ident $(::<$level:ident>)? ($x:ident $(, $y:ident)*))*) => {
+                    $(let wide = $x.$function$(::<$level>)?($($y),*);
+                    for lane in 0..<S::Lanes<L> as Lane<S>>::LANES {
+                        let alone = $x.extract(lane).$function$(::<$level>)?($($y.extract(lane)),*);
+                        let is_same = |number: S| number.equal(alone).all() || !alone.equal(alone).all();
+                        assert!(is_same(wide.extract(lane)), "{} at {}", stringify!($function), L::NAME);
+                    })*
+                };
+            }
+            same! {
+                sqrt(a) abs(a) min(a, b) max(a, b) sin::<L>(a) cos::<L>(a) sin::<L>(large) cos::<L>(large) exp::<L>(a)
+                ln::<L>(a) ln::<L>(large) atan2::<L>(a, b) atan2::<L>(large, b) powf::<L>(a, b) mul_add::<L>(a, b, c)
+                fused_mul_sub::<L>(a, b, c) sum_error(a, large) difference_error(a, large) product_error::<L>(a, b)
+                root_error::<L>(a, b) power_of_two_scale(large)
+            }
+        }
+    }
+
+    /// Checks that running sums have the bits of sums of numbers.
+    fn add_blocks<S: Float, L: Level, B: BlockSum<S>>() {
+        let mut random = fastrand::Rng::with_seed(7);
+        let mut draw = || S::from_f64(2.0 * random.f64() - 1.0);
+        let (mut sum, mut expected) = (B::zero(), Rows::<S, L>::zero());
+        for _ in 0..10 {
+            let mut block = [S::from_f64(0.0); 16];
+            block.iter_mut().for_each(|number| *number = draw());
+            let vector = [draw(), draw(), draw(), S::from_f64(0.0)];
+            sum.add(&block, &vector);
+            expected.add(&block, &vector);
+            assert!((0..3).all(|row| sum.total()[row].equal(expected.total()[row]).all()), "{}", L::NAME);
+            let from = [draw(), draw(), draw(), S::from_f64(0.0)];
+            let (found, expected) = (B::less(from, &block, &vector), Rows::<S, L>::less(from, &block, &vector));
+            assert!((0..3).all(|row| found[row].equal(expected[row]).all()), "{}", L::NAME);
+        }
+    }
+
+    struct Compare;
+
+    impl Kernel for Compare {
+        type Output = ();
+
+        #[inline(always)]
+        fn run<L: Level>(self) {
+            compare::<f64, L>();
+            compare::<f32, L>();
+            add_blocks::<f64, L, L::Sum64>();
+            add_blocks::<f32, L, L::Sum32>();
+        }
+    }
+
+    #[test]
+    fn lanes_of_all_levels_have_the_bits_of_scalars() {
+        for level in available() {
+            dispatch_at(level, Compare).unwrap();
+        }
+    }
+}

@@ -150,3 +150,44 @@ fn fast_sum<D: Number + Copy>(larger: D, smaller: D) -> (D, D) {
     let sum = larger + smaller;
     (sum, (larger - sum) + smaller)
 }
+
+#[cfg(test)]
+mod tests {
+    use fastrand::Rng;
+
+    use crate::numbers::{Baseline, Number};
+
+    #[track_caller]
+    fn assert_near(found: f64, expected: f64, what: &str, at: &[f64]) {
+        let allowed = 4.0 * f64::EPSILON * expected.abs() + f64::from_bits(4);
+        assert!((found - expected).abs() <= allowed || found == expected, "{what} {at:?}: {found:e}, {expected:e}");
+    }
+
+    #[test]
+    fn functions_are_those_of_the_standard_library() {
+        type B = Baseline;
+        let mut random = Rng::with_seed(5);
+        let mut draw = |exponents: std::ops::RangeInclusive<i32>| {
+            let size = (1.0 + random.f64()) * 2.0_f64.powi(random.i32(exponents));
+            if random.bool() { size } else { -size }
+        };
+        for _ in 0..100_000 {
+            for x in [draw(-40..=10), draw(10..=1022)] {
+                assert_near(Number::sin::<B>(x), x.sin(), "sin", &[x]);
+                assert_near(Number::cos::<B>(x), x.cos(), "cos", &[x]);
+            }
+            let x = draw(-60..=8);
+            assert_near(Number::exp::<B>(x), x.exp(), "exp", &[x]);
+            let x = draw(-1000..=1000).abs();
+            assert_near(Number::ln::<B>(x), x.ln(), "ln", &[x]);
+            let x = 1.0 + draw(-50..=-2);
+            assert_near(Number::ln::<B>(x), x.ln(), "ln", &[x]);
+            let (y, x) = (draw(-300..=300), draw(-300..=300));
+            assert_near(Number::atan2::<B>(y, x), y.atan2(x), "atan2", &[y, x]);
+            let (y, x) = (draw(-4..=4), draw(-4..=4));
+            assert_near(Number::atan2::<B>(y, x), y.atan2(x), "atan2", &[y, x]);
+            let (x, exponent) = (draw(-30..=30).abs(), draw(-10..=4));
+            assert_near(Number::powf::<B>(x, exponent), x.powf(exponent), "power", &[x, exponent]);
+        }
+    }
+}
