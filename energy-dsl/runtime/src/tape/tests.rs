@@ -239,7 +239,7 @@ fn arguments_that_do_not_fit_are_refused() {
     assert_eq!(evaluate(0..COUNT, &rows, 2 * COUNT), Ok(()));
     let wrong = |needed, given| Err(BatchError::Output { of: "forces", needed, given });
     assert_eq!(evaluate(0..COUNT, &rows, 2 * COUNT + 1), wrong(2 * COUNT, 2 * COUNT + 1));
-    for range in [1..COUNT, 0..COUNT + 1, 64..0] {
+    for range in [1..COUNT, 0..COUNT + 1, Range { start: 64, end: 0 }] {
         let expected = BatchError::Range { range: range.clone(), elements: COUNT, block: TAPE_BLOCK };
         assert_eq!(evaluate(range, &rows, 0), Err(expected));
     }
