@@ -70,7 +70,7 @@ mod tests {
         for count in 0..100 {
             let all = Aligned::new(count, number);
             assert_eq!(*all, vec![number; count]);
-            assert!(count == 0 || all.as_ptr() as usize % 64 == 0 && all.clone().as_ptr() as usize % 64 == 0);
+            assert!(count == 0 || [&all, &all.clone()].iter().all(|all| all.as_ptr().align_offset(64) == 0));
         }
     }
 

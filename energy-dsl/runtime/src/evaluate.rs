@@ -97,3 +97,14 @@ pub fn evaluate_residual<T: Real, E: Residual<T>>(element: &E, inputs: &Inputs<'
         flags: [residual.flags, jacobian.flags, Flags::clear()],
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_become_points() {
+        assert_eq!(points::<f64, [Vector3<f64>; 2]>(&[1.0, 2.0, 3.0, 4.0, 5.0]), [[1.0, 2.0, 3.0], [4.0, 5.0, 0.0]]);
+        assert_eq!(flat(&[[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]]), [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]);
+    }
+}

@@ -1,6 +1,7 @@
 //! Batches of an element that is written by hand.
 
 use std::borrow::Cow;
+use std::ops::Range;
 
 use super::*;
 use crate::declaration::{Declaration, Kind};
@@ -171,14 +172,14 @@ fn vectors(seed: u64) -> Vec<Vector3<f64>> {
 }
 
 /// The ranges to evaluate: all, single blocks, and ranges that end within a block.
-const RANGES: [std::ops::Range<usize>; 6] = [0..COUNT, 0..16, 16..32, 16..COUNT, 32..34, 16..16];
+const RANGES: [Range<usize>; 6] = [0..COUNT, 0..16, 16..32, 16..COUNT, 32..34, 16..16];
 
 fn indices(flagged: &Flagged) -> Vec<usize> {
     assert!(flagged.iter().all(|(_, flags)| flags.degenerate != flags.kink));
     flagged.iter().map(|(index, _)| *index).collect()
 }
 
-fn flagged_in(range: &std::ops::Range<usize>) -> Vec<usize> {
+fn flagged_in(range: &Range<usize>) -> Vec<usize> {
     FLAGGED.into_iter().filter(|index| range.contains(index)).collect()
 }
 
@@ -305,7 +306,7 @@ fn arguments_that_do_not_fit_are_refused() {
     assert_eq!(of(packed.force_jacobians(0..0, &x, &x, &mut b, &mut c, &mut a)), wrong("Jacobians by velocity"));
     assert_eq!(of(packed.residuals(0..0, &numbers.clone(), &mut a)), wrong("residuals"));
     assert_eq!(of(packed.jacobians(0..0, &numbers.clone(), &mut b, &mut a)), wrong("Jacobians"));
-    for range in [1..COUNT, 0..COUNT + 1, 16..0] {
+    for range in [1..COUNT, 0..COUNT + 1, Range { start: 16, end: 0 }] {
         let expected = BatchError::Range { range: range.clone(), elements: COUNT, block: BLOCK };
         assert_eq!(packed.values(range, &x, &mut numbers).map(|_| ()), Err(expected));
     }

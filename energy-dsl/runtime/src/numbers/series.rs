@@ -573,4 +573,13 @@ mod tests {
         assert!(!Series::undefined().is_open() && matches!(Series::undefined().limit(), Limit::Unknown));
         assert!(!Series::number(1.0).is_open());
     }
+
+    #[test]
+    fn rows_are_whole_powers_apart() {
+        let order = |power: f64| Order { power, logs: 0.0 };
+        assert_eq!(order(2.5).row_from(order(0.5)), Some(2));
+        assert_eq!(order(0.5).row_from(order(0.5)), Some(0));
+        assert_eq!([order(0.5), order(3.0), order(20.5)].map(|of| of.row_from(order(2.5))), [None; 3]);
+        assert_eq!(Order { power: 2.5, logs: 1.0 }.row_from(order(0.5)), None);
+    }
 }

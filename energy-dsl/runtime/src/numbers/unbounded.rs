@@ -567,6 +567,7 @@ mod tests {
     fn numbers_without_a_place_are_infinite_or_rounded_once() {
         assert_eq!((of(1e200) * of(1e200)).to_scalar(), f64::INFINITY);
         assert_eq!((of(-1e200) * of(1e200)).to_scalar(), f64::NEG_INFINITY);
+        assert_eq!((of(3e200) * of(5e107)).to_scalar(), 3e200 * 5e107);
         assert_eq!((of(1e-200) * of(1e-200)).to_scalar(), 0.0);
         assert_eq!((of(3e-200) * of(7e-120)).to_scalar(), 3e-200 * 7e-120);
         let least = f64::from_bits(1);

@@ -44,6 +44,9 @@ fn routines() -> Arc<Routines> {
     let positions = (0..COORDINATES as u16).map(Input::Position);
     let (parameter, stored, zero) = (6, 7, 8);
     let first = 9;
+    // The last result is coordinate 5 where coordinate 0 is below 0, and coordinate 1 elsewhere.
+    let last = first + RESULTS as u16 - 1;
+    let chosen = instruction(Operation::Select, last, &[0, 5, 1]);
     let result = |result: u16| instruction(Operation::MulAdd, first + result, &[result % 6, parameter, stored]);
     let flags = [0, 1].map(|flag| instruction(Operation::Less, flag, &[flag, zero]));
     let force = Routine {
@@ -54,7 +57,7 @@ fn routines() -> Arc<Routines> {
             masks: 2,
             constants: vec![(zero, Constant::Number(0.0))],
             truths: Vec::new(),
-            instructions: (0..RESULTS as u16).map(result).chain(flags).collect(),
+            instructions: (0..RESULTS as u16).map(result).chain(flags).chain([chosen]).collect(),
         },
         groups: vec![(first..first + RESULTS as u16).collect()],
         flags: [Some(0), Some(1)],
@@ -97,8 +100,10 @@ fn coordinates(element: usize) -> [f64; COORDINATES] {
 }
 
 /// Returns the results of an element with the number of another one.
-fn expected(number: usize, coordinates: [f64; COORDINATES]) -> [f64; RESULTS] {
-    std::array::from_fn(|result| coordinates[result % 6] * parameter(number) + 8.0 * rest(number))
+fn expected(number: usize, x: [f64; COORDINATES]) -> [f64; RESULTS] {
+    let chosen = if x[0] < 0.0 { x[5] } else { x[1] };
+    let product = |result: usize| x[result % 6] * parameter(number) + 8.0 * rest(number);
+    std::array::from_fn(|result| if result == RESULTS - 1 { chosen } else { product(result) })
 }
 
 const RANGES: [Range<usize>; 5] = [0..COUNT, 0..64, 64..128, 128..COUNT, 64..67];
@@ -189,7 +194,7 @@ fn general_paths_replace_the_results_that_need_them() {
     let flagged = elements.evaluate(RoutineKind::Force, 0..COUNT, Places::Rows(&rows), None, &mut outputs).unwrap();
     for (element, row) in numbers.chunks(RESULTS).enumerate() {
         let expected = match (is_general(element), coordinates(element)) {
-            (false, x) => std::array::from_fn(|result| 2.0 * x[result % 6] + 4.0),
+            (false, x) => std::array::from_fn(|at| if at == RESULTS - 1 { x[1] } else { 2.0 * x[at % 6] + 4.0 }),
             (true, x) => [if x[4] < 0.0 { 0.0 } else { 2.0 * x[3] }; RESULTS],
         };
         assert_eq!(row, expected, "element {element}");
@@ -234,7 +239,7 @@ fn arguments_that_do_not_fit_are_refused() {
     assert_eq!(evaluate(0..COUNT, &rows, 2 * COUNT), Ok(()));
     let wrong = |needed, given| Err(BatchError::Output { of: "forces", needed, given });
     assert_eq!(evaluate(0..COUNT, &rows, 2 * COUNT + 1), wrong(2 * COUNT, 2 * COUNT + 1));
-    for range in [1..COUNT, 0..COUNT + 1, 64..0] {
+    for range in [1..COUNT, 0..COUNT + 1, Range { start: 64, end: 0 }] {
         let expected = BatchError::Range { range: range.clone(), elements: COUNT, block: TAPE_BLOCK };
         assert_eq!(evaluate(range, &rows, 0), Err(expected));
     }

@@ -282,8 +282,10 @@ mod tests {
         let mut random = Rng::with_seed(4);
         let mut place = |number: usize| {
             let angle = std::f64::consts::TAU * random.f64();
-            let radius = if number % 2 == 0 { 1e-9 } else { 1.0 + 1.01e-9 };
-            let height = if number % 2 == 0 { 1e-5 * random.f64() } else { 0.0 };
+            let (radius, height) = match number % 2 {
+                0 => (1e-9, 1e-5 * random.f64()),
+                _ => (1.0 + 1.01e-9, 0.0),
+            };
             [radius * angle.cos(), radius * angle.sin(), height]
         };
         let vertices: Vec<_> = (0..40_000).map(&mut place).collect();
