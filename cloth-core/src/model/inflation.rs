@@ -108,7 +108,7 @@ mod tests {
 
     #[test]
     fn the_energy_of_pressure_is_that_of_the_enclosed_volume_and_a_ring_swells() {
-        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../scenes/torus.obj");
+        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../scenes/torus.obj");
         let text = format!(
             "dt = 0.01\nduration = 0.1\nintegrator = \"newton\"\ncontact = \"off\"\ngravity = [0.0, 0.0, 0.0]\n\
              [[garment]]\nname = \"tube\"\nmesh.obj.path = \"{path}\"\nfabric.density = 0.2\n\
