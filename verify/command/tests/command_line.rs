@@ -156,6 +156,9 @@ fn an_unknown_element_is_rejected_with_the_known_ones() {
     assert_eq!(output.status.code(), Some(2));
     let message = text(&output.stderr);
     assert!(message.contains("Sprin") && message.contains("HairBend"), "{message}");
+    let output = verify(&["audit", "own.energy"]);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(text(&output.stderr).contains("give it as `--file own.energy`"));
 }
 
 #[test]

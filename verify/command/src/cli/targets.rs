@@ -7,6 +7,9 @@ use verify::audit::{Target, targets_in};
 /// Returns the elements with these names from the catalogue, or from a file if one is given. An empty list selects all.
 pub fn targets(names: &[String], file: Option<&Path>) -> anyhow::Result<Vec<Target>> {
     let Some(file) = file else {
+        if let Some(path) = names.iter().find(|name| name.ends_with(".energy")) {
+            anyhow::bail!("{path} is a file, not the name of an element; give it as `--file {path}`");
+        }
         let names: Vec<&str> = names.iter().map(String::as_str).collect();
         return targets_in(verify_command::catalogue::elements(), &names).map_err(anyhow::Error::msg);
     };

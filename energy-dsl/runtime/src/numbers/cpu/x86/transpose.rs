@@ -361,7 +361,7 @@ fn fours_8([a, b, c, d]: [__m256; 4]) -> [__m256; 4] {
     ]
 }
 
-/// As [`fours_8`].
+/// Like [`fours_8`], with four quarters.
 #[target_feature(enable = "avx512f,avx512dq,avx512vl,avx512bw,avx2,fma")]
 #[inline]
 fn fours_16([a, b, c, d]: [__m512; 4]) -> [__m512; 4] {
