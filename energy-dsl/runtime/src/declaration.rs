@@ -124,12 +124,12 @@ pub struct Routine {
     pub full: OperationCount,
 }
 
-/// Points of a sum, with their signs: `true` if the point is added, `false` if it is subtracted.
-pub type SignedPoints = Cow<'static, [(usize, bool)]>;
+/// Points of a sum, with their weights.
+pub type WeightedPoints = Cow<'static, [(usize, f64)]>;
 
 /// Self-description of an element. Generated code borrows its texts and lists; elements that are read at run time own
 /// them.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Declaration {
     /// Name of the generated type.
     pub name: Cow<'static, str>,
@@ -166,8 +166,8 @@ pub struct Declaration {
     pub symmetric: bool,
     /// Number of reduced coordinates.
     pub reduced_coordinates: usize,
-    /// Each difference vector in the reduced coordinates. Empty for residuals.
-    pub reduced_vectors: Cow<'static, [SignedPoints]>,
+    /// Each vector of the reduced coordinates, a sum of points. Empty for residuals.
+    pub reduced_vectors: Cow<'static, [WeightedPoints]>,
     /// Points x₁, x₂, x₃ and x₄ if the energy depends on points only through the dihedral angle of the triangles
     /// x₁x₃x₄ and x₂x₃x₄. `reduced_vectors` are then x₄ − x₃, x₁ − x₃ and x₂ − x₃, in this order. `None` for all other
     /// formulas.

@@ -27,7 +27,7 @@ pub use batch::{
 };
 #[doc(hidden)]
 pub use choose::Choose;
-pub use declaration::{Declaration, Field, Kind, OperationCount, Property, Routine, SignedPoints};
+pub use declaration::{Declaration, Field, Kind, OperationCount, Property, Routine, WeightedPoints};
 pub use element::{
     AnyElement, Block, Constraint, Element, ForceLaw, Inputs, Outputs, Potential, ReducedPotential, Residual,
     RestError, Vector3, triangle_index,

@@ -45,8 +45,8 @@ pub struct HessianVector<T: Number, Points> {
     pub flags: Flags<T>,
 }
 
-/// Value, gradient and Hessian in reduced coordinates: the differences of points that the energy depends on, three
-/// numbers each, listed in [`crate::Declaration::reduced_vectors`].
+/// Value, gradient and Hessian in reduced coordinates: the differences or other sums of points that the energy depends
+/// on, three numbers each, listed in [`crate::Declaration::reduced_vectors`].
 #[derive(Clone, Copy, Debug)]
 pub struct ReducedHessian<T: Number, Coordinates, Upper> {
     /// The energy U.

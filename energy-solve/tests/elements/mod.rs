@@ -33,7 +33,7 @@ const fn declaration(
         velocity_dependent: matches!(kind, Kind::Force),
         symmetric: matches!(kind, Kind::Energy),
         reduced_coordinates: 3,
-        reduced_vectors: Borrowed(&[Borrowed(&[(0, true), (1, false)])]),
+        reduced_vectors: Borrowed(&[Borrowed(&[(0, 1.0), (1, -1.0)])]),
         dihedral: None,
         primitives: Borrowed(&[]),
         routines: Borrowed(&[]),

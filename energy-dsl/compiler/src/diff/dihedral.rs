@@ -35,7 +35,7 @@ pub fn only_dihedral(g: &Graph, output: NodeId, coordinates: &Coordinates) -> Op
     };
     let reduced = arguments.len() == coordinates.len() && arguments.iter().enumerate().all(is_coordinate);
     match coordinates.vectors.iter().map(Vec::as_slice).collect::<Vec<_>>()[..] {
-        [&[(x4, true), (x3, false)], &[(x1, true), (a, false)], &[(x2, true), (b, false)]]
+        [&[(x4, 1.0), (x3, -1.0)], &[(x1, 1.0), (a, -1.0)], &[(x2, 1.0), (b, -1.0)]]
             if reduced && a == x3 && b == x3 =>
         {
             Some([x1, x2, x3, x4])

@@ -1,22 +1,22 @@
-//! Expands reduced derivatives to points. Derivatives with respect to points are ±1 combinations of those with respect
-//! to differences.
+//! Expands reduced derivatives to points: weighted sums of the derivatives with respect to linear functions of the
+//! points. For differences, the weights are ±1.
 
-use super::coordinates::Coordinates;
+use super::coordinates::{Coordinates, add_weighted};
 use crate::graph::{Graph, NodeId, symmetric_index};
 
 impl Coordinates {
-    /// Returns the sign of `point` in a coordinate vector; `None` if it is not part of it.
-    fn sign(&self, vector: usize, point: usize) -> Option<bool> {
-        self.vectors[vector].iter().find(|&&(p, _)| p == point).map(|&(_, positive)| positive)
+    /// Returns the weight of `point` in a coordinate vector; `None` if it is not part of it.
+    fn weight(&self, vector: usize, point: usize) -> Option<f64> {
+        self.vectors[vector].iter().find(|&&(p, _)| p == point).map(|&(_, weight)| weight)
     }
 
-    /// Returns the signed sum of `entry` over the vectors that contain `point`.
-    fn signed_sum(&self, g: &mut Graph, point: usize, mut entry: impl FnMut(&mut Graph, usize) -> NodeId) -> NodeId {
+    /// Returns the weighted sum of `entry` over the vectors that contain `point`.
+    fn weighted_sum(&self, g: &mut Graph, point: usize, mut entry: impl FnMut(&mut Graph, usize) -> NodeId) -> NodeId {
         let mut sum = g.constant(0.0);
         for vector in 0..self.vectors.len() {
-            let Some(positive) = self.sign(vector, point) else { continue };
+            let Some(weight) = self.weight(vector, point) else { continue };
             let term = entry(g, vector);
-            sum = if positive { g.add(sum, term) } else { g.sub(sum, term) };
+            sum = add_weighted(g, sum, weight, term);
         }
         sum
     }
@@ -24,7 +24,7 @@ impl Coordinates {
     /// Returns the derivative with respect to one point, given those with respect to the coordinates.
     pub fn expand(&self, g: &mut Graph, reduced: &[NodeId], point: usize) -> Vec<NodeId> {
         let n = self.components;
-        (0..n).map(|axis| self.signed_sum(g, point, |_, vector| reduced[n * vector + axis])).collect()
+        (0..n).map(|axis| self.weighted_sum(g, point, |_, vector| reduced[n * vector + axis])).collect()
     }
 
     /// Returns the derivatives with respect to all points.
@@ -79,6 +79,6 @@ impl Coordinates {
         entry: impl Fn(usize, usize) -> NodeId,
     ) -> NodeId {
         // The inner sum runs over the vectors of the column, so that points in the same row share it.
-        self.signed_sum(g, i, |g, a| self.signed_sum(g, j, |_, b| entry(3 * a + row, 3 * b + column)))
+        self.weighted_sum(g, i, |g, a| self.weighted_sum(g, j, |_, b| entry(3 * a + row, 3 * b + column)))
     }
 }

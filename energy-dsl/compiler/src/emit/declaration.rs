@@ -10,7 +10,7 @@ pub(super) fn declaration(declaration: &Declaration) -> TokenStream {
     let kind = declaration.kind;
     let kind = format_ident!("{kind:?}");
     let vectors = declaration.reduced_vectors.iter().map(|vector| {
-        let ends = vector.iter().map(|(point, sign)| quote!((#point, #sign)));
+        let ends = vector.iter().map(|(point, weight)| quote!((#point, #weight)));
         borrowed(quote!(&[#(#ends),*]))
     });
     let dihedral = match declaration.dihedral {

@@ -20,7 +20,7 @@ pub struct Elements<S = f64> {
 }
 
 /// Elements that cannot be evaluated. Nothing was written.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum EvaluateError {
     /// Declarations of this kind do not have the routine.

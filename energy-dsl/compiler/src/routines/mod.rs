@@ -158,8 +158,8 @@ pub struct Routines {
     pub list: Vec<Routine>,
     /// Number of reduced coordinates.
     pub coordinates: usize,
-    /// Points of each coordinate vector, with signs; empty for residuals.
-    pub vectors: Vec<Vec<(usize, bool)>>,
+    /// Points of each coordinate vector, with weights; empty for residuals.
+    pub vectors: Vec<Vec<(usize, f64)>>,
     /// Expansion of the derivatives of an energy to points.
     pub expansion: Option<Expansion>,
     /// Points of the dihedral angle that the energy is a function of; `None` for other formulas.

@@ -2,9 +2,9 @@ use energy_dsl::{Declaration, Lane};
 
 use super::{MOST, Square};
 
-/// Transformation between an element's difference vectors and orthonormal ones with the same span.
+/// Transformation between the vectors of an element's reduced coordinates and orthonormal ones with the same span.
 ///
-/// Let q = D x be the difference vectors (D ⊗ 1₃ acts on the points' coordinates) and H the Hessian by q. The Hessian
+/// Let q = D x be the vectors, differences or other sums of the points (D ⊗ 1₃ acts on the points' coordinates) and H the Hessian by q. The Hessian
 /// by points is Dᵀ H D. With D Dᵀ = L Lᵀ, the rows of Q = L⁻¹ D are orthonormal, and Dᵀ H D = Qᵀ (Lᵀ H L) Q. Its
 /// eigenvalues are zeros and those of Lᵀ H L. Therefore the projection acts on Lᵀ H L, not on H, whose eigenvalues
 /// differ.
@@ -17,17 +17,16 @@ pub(crate) struct Orthonormal {
 }
 
 impl Orthonormal {
-    /// Creates the transformation for a declaration. `None` without difference vectors, or if they are linearly
+    /// Creates the transformation for a declaration. `None` without such vectors, or if they are linearly
     /// dependent.
     pub(crate) fn new(declaration: &Declaration) -> Option<Self> {
         let vectors = &*declaration.reduced_vectors;
         if vectors.is_empty() || declaration.reduced_coordinates != 3 * vectors.len() {
             return None;
         }
-        let sign = |added: bool| if added { 1.0 } else { -1.0 };
-        let dot = |a: &[(usize, bool)], b: &[(usize, bool)]| -> f64 {
+        let dot = |a: &[(usize, f64)], b: &[(usize, f64)]| -> f64 {
             let terms = a.iter().flat_map(|p| b.iter().map(move |q| (p, q)));
-            terms.filter(|(p, q)| p.0 == q.0).map(|(p, q)| sign(p.1) * sign(q.1)).sum()
+            terms.filter(|(p, q)| p.0 == q.0).map(|(p, q)| p.1 * q.1).sum()
         };
         let n = vectors.len();
         let (mut lower, mut inverse) = (vec![vec![0.0; n]; n], vec![vec![0.0; n]; n]);
@@ -35,7 +34,7 @@ impl Orthonormal {
             for j in 0..=i {
                 let known: f64 = (0..j).map(|k| lower[i][k] * lower[j][k]).sum();
                 let rest = dot(&vectors[i], &vectors[j]) - known;
-                if i == j && rest < 1e-9 {
+                if i == j && rest < 1e-9 * dot(&vectors[i], &vectors[i]) {
                     return None;
                 }
                 lower[i][j] = if i == j { rest.sqrt() } else { rest / lower[j][j] };

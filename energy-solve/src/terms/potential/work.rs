@@ -223,10 +223,9 @@ pub(super) fn difference_vectors<L: Level>(
         return vectors;
     }
     for (vector, terms) in vectors.iter_mut().zip(&*declaration.reduced_vectors) {
-        for &(point, added) in &**terms {
+        for &(point, weight) in &**terms {
             for axis in 0..3 {
-                let part = points[point][axis];
-                vector[axis] = if added { vector[axis] + part } else { vector[axis] - part };
+                vector[axis] = vector[axis] + L::F64::splat(weight) * points[point][axis];
             }
         }
     }
