@@ -1,8 +1,8 @@
 use std::collections::BTreeMap;
 
 use super::forward::Sparse;
-use super::fraction::Weights;
-use super::linear::Front;
+use super::weights::Sum;
+use super::linear::{self, Front};
 use crate::graph::{Graph, Input, NodeId};
 
 /// The inputs that derivatives are taken with respect to.
@@ -14,8 +14,7 @@ pub enum Moving {
     Velocities,
 }
 
-/// Reduced coordinates: independent linear functions of the points through which the points enter the formula. If the
-/// weights of each add up to 0, the formula is invariant under translations.
+/// Reduced coordinates: independent linear functions of the points through which the points enter the formula.
 #[derive(Clone, Debug)]
 pub struct Coordinates {
     /// Dual parts, constants, of the nodes where differentiation starts.
@@ -24,7 +23,7 @@ pub struct Coordinates {
     pub vectors: Vec<Vec<(usize, f64)>>,
     /// Components of a vector.
     pub components: usize,
-    /// Whether every point is used in differences only.
+    /// Whether no translation of all points changes the outputs.
     pub translation_invariant: bool,
 }
 
@@ -85,17 +84,14 @@ impl Coordinates {
         let differences = Front::of_differences(g, outputs, moving);
         let functions = Front::of_linear_functions(g, outputs, moving);
         let fewer = functions.filter(|functions| functions.span.basis.len() < differences.span.basis.len());
-        Self::from_front(g, &fewer.unwrap_or(differences))
-    }
-
-    fn from_front(g: &mut Graph, front: &Front) -> Self {
-        let seed = |g: &mut Graph, axis: usize, weights: &Weights| -> Sparse {
-            weights.iter().map(|(vector, weight)| (3 * vector + axis, g.constant(weight.value()))).collect()
+        let front = fewer.unwrap_or(differences);
+        let seed = |g: &mut Graph, axis: usize, sum: &Sum| -> Sparse {
+            sum.iter().map(|(vector, weight)| (3 * vector + axis, g.constant(weight))).collect()
         };
-        let seeds = front.nodes.iter().map(|(&node, (axis, weights))| (node, seed(g, *axis, weights))).collect();
+        let seeds = front.nodes.iter().map(|(&node, (axis, sum))| (node, seed(g, *axis, sum))).collect();
         let basis = &front.span.basis;
-        let vectors = basis.iter().map(|sum| sum.iter().map(|(point, weight)| (point, weight.value())).collect());
-        let translation_invariant = basis.iter().all(Weights::cancel);
+        let vectors = basis.iter().map(|sum| sum.iter().collect());
+        let translation_invariant = linear::is_translation_invariant(g, outputs, moving);
         Self { seeds, vectors: vectors.collect(), components: 3, translation_invariant }
     }
 }

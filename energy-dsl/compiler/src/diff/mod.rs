@@ -11,10 +11,10 @@ mod cut;
 mod dihedral;
 mod expand;
 mod forward;
-mod fraction;
 mod linear;
 mod local;
 mod routes;
+mod weights;
 
 pub use coordinates::{Coordinates, Moving};
 pub use dihedral::only_dihedral;

@@ -1,0 +1,162 @@
+//! Finds the linear functions of the points through which the points enter a formula. Their weights are exact, so that
+//! the number of independent ones, and invariance under translations, are facts and no estimates.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::coordinates::Moving;
+use super::weights::{Span, Sum, Weight};
+use super::local::Order;
+use super::{differentiable, moving_operands};
+use crate::graph::{Graph, Input, NodeId, Op};
+
+/// The largest weight of an independent sum in another one. Rounding errors of larger ones would be felt.
+const LARGEST: f64 = 100.0;
+
+/// Nodes through which the points enter a formula. Each is one component of a sum of points with constant weights.
+#[derive(Default)]
+pub(super) struct Front {
+    /// The nodes, each with its axis and the weights of the independent sums that it is made of.
+    pub(super) nodes: BTreeMap<NodeId, (usize, Sum)>,
+    /// The independent sums of points.
+    pub(super) span: Span,
+}
+
+impl Front {
+    /// Finds the points and the differences of two points that `outputs` are computed from.
+    pub(super) fn of_differences(g: &Graph, outputs: &[NodeId], moving: Moving) -> Self {
+        let coordinate = |node| coordinate(g, node, moving);
+        let mut front = Self::default();
+        for &output in outputs {
+            if let Some((point, axis)) = coordinate(output) {
+                front.add(output, axis, &Sum::of(point));
+            }
+        }
+        for node in between(g, outputs) {
+            if let Op::Sub(a, b) = g.op(node)
+                && let (Some((p, axis)), Some((q, other))) = (coordinate(a), coordinate(b))
+                && axis == other
+            {
+                front.add(node, axis, &Sum::of(p).minus(&Sum::of(q)));
+                continue;
+            }
+            for operand in operands(g, node) {
+                if let Some((point, axis)) = coordinate(operand) {
+                    front.add(operand, axis, &Sum::of(point));
+                }
+            }
+        }
+        front
+    }
+
+    /// Finds the last linear functions of points on all paths to `outputs`; `None` if some are almost
+    /// dependent.
+    pub(super) fn of_linear_functions(g: &Graph, outputs: &[NodeId], moving: Moving) -> Option<Self> {
+        let mut linear: BTreeMap<NodeId, (usize, Sum)> = BTreeMap::new();
+        let mut front = Self::default();
+        for node in between(g, outputs) {
+            g.budget().spend(1, 0);
+            if let Some(function) = linear_function(g, node, moving, &linear) {
+                linear.insert(node, function);
+                continue;
+            }
+            for operand in operands(g, node) {
+                if let Some((axis, sum)) = linear.get(&operand) {
+                    front.add(operand, *axis, sum);
+                }
+            }
+        }
+        for output in outputs {
+            if let Some((axis, sum)) = linear.get(output) {
+                front.add(*output, *axis, sum);
+            }
+        }
+        front.nodes.values().all(|(_, sum)| sum.is_within(LARGEST)).then_some(front)
+    }
+
+    fn add(&mut self, node: NodeId, axis: usize, sum: &Sum) {
+        let in_basis = self.span.in_basis(sum);
+        self.nodes.insert(node, (axis, in_basis));
+    }
+}
+
+/// Returns whether a translation of all points changes nothing that `outputs` are computed from, conditions included,
+/// but for rounding errors.
+pub(super) fn is_translation_invariant(g: &Graph, outputs: &[NodeId], moving: Moving) -> bool {
+    let operands = |node: NodeId| match g.rule(node) {
+        Some(rule) => rule.arguments.clone(),
+        None if g.op(node).is_constant_in_exact_arithmetic() => Vec::new(),
+        None => g.op(node).operands().collect(),
+    };
+    let mut seen: BTreeSet<NodeId> = BTreeSet::new();
+    let mut stack = outputs.to_vec();
+    while let Some(node) = stack.pop() {
+        if g.varies(node) && seen.insert(node) {
+            stack.extend(operands(node));
+        }
+    }
+    let mut linear: BTreeMap<NodeId, (usize, Sum)> = BTreeMap::new();
+    for node in seen {
+        if let Some(function) = linear_function(g, node, moving, &linear) {
+            linear.insert(node, function);
+        } else if operands(node).iter().filter_map(|operand| linear.get(operand)).any(|(_, sum)| !sum.cancels()) {
+            return false;
+        }
+    }
+    outputs.iter().filter_map(|output| linear.get(output)).all(|(_, sum)| sum.cancels())
+}
+
+/// Returns the nodes between the points and `outputs` that first or second derivatives pass through.
+fn between(g: &Graph, outputs: &[NodeId]) -> BTreeSet<NodeId> {
+    [Order::First, Order::Second].into_iter().flat_map(|order| differentiable(g, outputs, order)).collect()
+}
+
+/// Returns the operands that first or second derivatives pass through.
+fn operands(g: &Graph, node: NodeId) -> BTreeSet<NodeId> {
+    [Order::First, Order::Second].into_iter().flat_map(|order| moving_operands(g, node, order)).collect()
+}
+
+/// Returns the point and the axis of an input that moves.
+fn coordinate(g: &Graph, node: NodeId, moving: Moving) -> Option<(usize, usize)> {
+    match (g.op(node), moving) {
+        (Op::Input(Input::Position(c)), Moving::Positions) | (Op::Input(Input::Velocity(c)), Moving::Velocities) => {
+            Some((usize::from(c) / 3, usize::from(c) % 3))
+        }
+        _ => None,
+    }
+}
+
+/// Returns the axis and the weights of a node that is a sum of points along one axis, up to a constant.
+fn linear_function(
+    g: &Graph,
+    node: NodeId,
+    moving: Moving,
+    known: &BTreeMap<NodeId, (usize, Sum)>,
+) -> Option<(usize, Sum)> {
+    if let Some((point, axis)) = coordinate(g, node, moving) {
+        return Some((axis, Sum::of(point)));
+    }
+    let constant = |node| g.as_constant(node).and_then(Weight::of);
+    let scaled = |node, factor: Weight| {
+        let (axis, sum): &(usize, Sum) = known.get(&node)?;
+        Some((*axis, sum.times(factor)))
+    };
+    let added = |a: NodeId, b: NodeId, sign: Weight| {
+        if !g.varies(b) {
+            return scaled(a, Weight::ONE);
+        }
+        if !g.varies(a) {
+            return scaled(b, sign);
+        }
+        let ((axis, a), (other, b)) = (known.get(&a)?, known.get(&b)?);
+        (axis == other).then(|| (*axis, a.plus(sign, b)))
+    };
+    match g.op(node) {
+        Op::Neg(a) => scaled(a, Weight::MINUS_ONE),
+        Op::Add(a, b) => added(a, b, Weight::ONE),
+        Op::Sub(a, b) => added(a, b, Weight::MINUS_ONE),
+        Op::Mul(a, b) if g.varies(a) => scaled(a, constant(b)?),
+        Op::Mul(a, b) => scaled(b, constant(a)?),
+        Op::Div(a, b) => scaled(a, constant(b)?.reciprocal()),
+        _ => None,
+    }
+}
