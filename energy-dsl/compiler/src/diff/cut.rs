@@ -85,6 +85,25 @@ pub(super) fn derivatives(
     Some(Gathered { gradient, hessian, safe })
 }
 
+/// Returns ∇U through the nodes of a cut of what first derivatives pass through, and whether it is right everywhere;
+/// `None` if it is not right on the ordinary path.
+pub(super) fn gradient(
+    g: &mut Graph,
+    output: NodeId,
+    cut: &[NodeId],
+    coordinates: &Coordinates,
+) -> Option<(Vec<NodeId>, bool)> {
+    let above = Coordinates::of_nodes(g, cut);
+    let whole = adjoint::alone(g, output);
+    let (slopes, is_safe) = match adjoint::gradient(g, &whole, &above, Order::First) {
+        Some(slopes) => (slopes, adjoint::is_safe(g, &[output], Order::First, true)),
+        None => (forward::first_derivatives(g, &[output], &above, Order::First).remove(0), true),
+    };
+    let weights: Weighted = cut.iter().copied().zip(slopes).collect();
+    let gradient = adjoint::gradient(g, &weights, coordinates, Order::First)?;
+    Some((gradient, is_safe && adjoint::is_safe(g, cut, Order::First, true)))
+}
+
 /// Returns the derivatives of U with respect to the nodes of the cut. They may be gathered at a cut above.
 fn by_cut(g: &mut Graph, output: NodeId, cut: &[NodeId], known: &mut ByCut) -> Gathered {
     if let Some(found) = known.known.get(cut) {
@@ -103,7 +122,7 @@ fn by_cut(g: &mut Graph, output: NodeId, cut: &[NodeId], known: &mut ByCut) -> G
             Gathered { gradient, hessian: forward::second_derivatives(g, output, &coordinates), safe: true }
         }
     };
-    let waists = if cut.len() < NESTED { Vec::new() } else { waists(g, output, &coordinates) };
+    let waists = if cut.len() < NESTED { Vec::new() } else { waists(g, output, &coordinates, Order::Second) };
     let mut least = best.cost(g);
     for waist in waists {
         if !known.goes_on(g) {
@@ -123,16 +142,21 @@ fn by_cut(g: &mut Graph, output: NodeId, cut: &[NodeId], known: &mut ByCut) -> G
 impl Gathered {
     fn cost(&self, g: &mut Graph) -> usize {
         let nodes: Vec<NodeId> = self.gradient.iter().chain(self.hessian.values()).copied().collect();
-        ordinary(g, &nodes).map_or_else(|| count(g, &nodes), |(nodes, _)| count(g, &nodes)).cost()
+        cost(g, &nodes)
     }
 }
 
+/// Returns what nodes cost on the ordinary path.
+pub(super) fn cost(g: &mut Graph, nodes: &[NodeId]) -> usize {
+    ordinary(g, nodes).map_or_else(|| count(g, nodes), |(nodes, _)| count(g, &nodes)).cost()
+}
+
 /// Returns the linear functions of the coordinates that U is computed from, unless they are more than the coordinates.
-fn linear_front(g: &Graph, output: NodeId, coordinates: &Coordinates) -> Option<Vec<NodeId>> {
+fn linear_front(g: &Graph, output: NodeId, coordinates: &Coordinates, order: Order) -> Option<Vec<NodeId>> {
     let mut linear: BTreeSet<NodeId> = BTreeSet::new();
     let mut front: BTreeSet<NodeId> = BTreeSet::new();
-    for node in differentiable(g, &[output], Order::Second) {
-        let operands = moving_operands(g, node, Order::Second);
+    for node in differentiable(g, &[output], order) {
+        let operands = moving_operands(g, node, order);
         let moving = || operands.iter().filter(|&&operand| g.varies(operand));
         let is_linear = match g.op(node) {
             Op::Add(..) | Op::Sub(..) | Op::Neg(_) => true,
@@ -155,6 +179,8 @@ fn linear_front(g: &Graph, output: NodeId, coordinates: &Coordinates) -> Option<
 struct Fronts<'a> {
     g: &'a Graph,
     coordinates: &'a Coordinates,
+    /// The derivatives that pass through the graph.
+    order: Order,
     front: BTreeSet<NodeId>,
     /// Uses of each node by nodes that were not replaced.
     users: BTreeMap<NodeId, usize>,
@@ -164,9 +190,9 @@ struct Fronts<'a> {
 const COMPARED: usize = 16;
 
 impl<'a> Fronts<'a> {
-    fn new(g: &'a Graph, output: NodeId, coordinates: &'a Coordinates) -> Self {
-        let mut fronts = Self { g, coordinates, front: BTreeSet::from([output]), users: BTreeMap::new() };
-        for node in differentiable(g, &[output], Order::Second) {
+    fn new(g: &'a Graph, output: NodeId, coordinates: &'a Coordinates, order: Order) -> Self {
+        let mut fronts = Self { g, coordinates, order, front: BTreeSet::from([output]), users: BTreeMap::new() };
+        for node in differentiable(g, &[output], order) {
             for operand in fronts.operands(node) {
                 *fronts.users.entry(operand).or_insert(0) += 1;
             }
@@ -179,7 +205,7 @@ impl<'a> Fronts<'a> {
         if self.coordinates.seeds.contains_key(&node) {
             return BTreeSet::new();
         }
-        moving_operands(self.g, node, Order::Second).into_iter().filter(|&operand| self.g.varies(operand)).collect()
+        moving_operands(self.g, node, self.order).into_iter().filter(|&operand| self.g.varies(operand)).collect()
     }
 
     /// Replaces the node whose operands are the fewest that are new, of equals the last one. Returns whether there was
@@ -211,9 +237,9 @@ const MOST_PRODUCTS: usize = 1_000_000;
 /// Returns the narrow parts of the graph between the coordinates and U: fronts that are narrower than all that are
 /// closer to the coordinates, and linear functions of the coordinates. Of many, it returns those of few nodes and the
 /// one that is closest to the coordinates.
-pub(super) fn waists(g: &Graph, output: NodeId, coordinates: &Coordinates) -> Vec<Vec<NodeId>> {
+pub(super) fn waists(g: &Graph, output: NodeId, coordinates: &Coordinates, order: Order) -> Vec<Vec<NodeId>> {
     let widest = (MOST_PRODUCTS / coordinates.len().pow(2).max(1)).min(coordinates.len().saturating_sub(1));
-    let mut fronts = Fronts::new(g, output, coordinates);
+    let mut fronts = Fronts::new(g, output, coordinates, order);
     let mut waists: Vec<Vec<NodeId>> = Vec::new();
     while fronts.advance() {
         let size = fronts.front.len();
@@ -226,7 +252,7 @@ pub(super) fn waists(g: &Graph, output: NodeId, coordinates: &Coordinates) -> Ve
         waists.swap(MOST_WAISTS - 1, last);
         waists.truncate(MOST_WAISTS);
     }
-    let linear = linear_front(g, output, coordinates).filter(|cut| !waists.contains(cut));
+    let linear = linear_front(g, output, coordinates, order).filter(|cut| !waists.contains(cut));
     waists.into_iter().chain(linear).collect()
 }
 

@@ -21,13 +21,18 @@ pub(super) fn combine(g: &mut Graph, terms: &[(NodeId, &Sparse)]) -> Sparse {
 }
 
 /// Returns mask ? a : b for each dual part.
-pub(super) fn choose(g: &mut Graph, mask: NodeId, a: &Sparse, b: &Sparse) -> Sparse {
+fn choose(g: &mut Graph, mask: NodeId, a: &Sparse, b: &Sparse) -> Sparse {
+    joined(g, a, b, |g, a, b| g.select(mask, a, b))
+}
+
+/// Joins the dual parts of each coordinate.
+fn joined(g: &mut Graph, a: &Sparse, b: &Sparse, join: impl Fn(&mut Graph, NodeId, NodeId) -> NodeId) -> Sparse {
     let zero = g.constant(0.0);
     let mut places: Vec<usize> = a.iter().chain(b).map(|&(c, _)| c).collect();
     places.sort_unstable();
     places.dedup();
     let find = |parts: &Sparse, place: usize| parts.iter().find(|&&(c, _)| c == place).map_or(zero, |&(_, n)| n);
-    places.into_iter().map(|c| (c, g.select(mask, find(a, c), find(b, c)))).collect()
+    places.into_iter().map(|c| (c, join(g, find(a, c), find(b, c)))).collect()
 }
 
 /// Returns the first derivatives of all nodes between the coordinates and `outputs`.
@@ -43,10 +48,11 @@ pub(super) fn tangents(
             continue;
         }
         let none = Sparse::new();
-        let parts = match g.op(node) {
-            Op::Select(mask, a, b) => {
-                let (a, b) = (tangents.get(&a).unwrap_or(&none), tangents.get(&b).unwrap_or(&none));
-                choose(g, mask, a, b)
+        let of = |node| tangents.get(&node).unwrap_or(&none);
+        let parts = match (g.op(node), g.computed_as(node)) {
+            (Op::Select(mask, a, b), _) => choose(g, mask, of(a), of(b)),
+            (_, Some([computed, defined])) if order == Order::FirstToDifferentiate => {
+                joined(g, of(defined), of(computed), Graph::compute_as)
             }
             _ => {
                 let local = local(g, node, order);

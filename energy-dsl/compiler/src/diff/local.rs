@@ -118,6 +118,10 @@ pub(super) fn local(g: &mut Graph, node: NodeId, order: Order) -> Local {
 }
 
 fn of_rule(g: &mut Graph, node: NodeId, order: Order) -> Local {
+    if let Some([computed, defined]) = g.computed_as(node) {
+        let operand = if order == Order::Second { defined } else { computed };
+        return Local::linear(vec![operand], vec![g.constant(1.0)]);
+    }
     let rule = g.rule(node).expect("a rule").clone();
     let n = rule.arguments.len();
     let second = match (order, &rule.second) {

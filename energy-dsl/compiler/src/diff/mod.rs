@@ -42,6 +42,13 @@ fn differentiable(graph: &Graph, outputs: &[NodeId], order: Order) -> BTreeSet<N
 /// Returns the nodes that a node is differentiated by. A rule has its arguments, or its value if only that can be
 /// differentiated. Masks and rounding errors have no derivatives.
 fn moving_operands(graph: &Graph, node: NodeId, order: Order) -> Vec<NodeId> {
+    if let Some([computed, defined]) = graph.computed_as(node) {
+        return match order {
+            Order::First => vec![computed],
+            Order::FirstToDifferentiate => vec![computed, defined],
+            Order::Second => vec![defined],
+        };
+    }
     match graph.rule(node) {
         Some(rule) if order == Order::Second && rule.second.is_none() => vec![rule.value],
         Some(rule) => rule.arguments.clone(),

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::coordinates::Coordinates;
 use super::local::Order;
-use super::{adjoint, cut, forward};
+use super::{adjoint, cut, differentiable, forward};
 use crate::graph::{Graph, NodeId, count, ordinary, symmetric_index};
 use energy_runtime::OperationCount;
 
@@ -92,39 +92,73 @@ pub fn second_order(
         hessian
     };
     let whole = adjoint::alone(g, value);
-    let safe = adjoint::is_safe(g, &[value], Order::Second, true);
-    let forward_gradient = forward::first_derivatives(g, &[value], coordinates, Order::First).remove(0);
-    let reverse_gradient = adjoint::gradient(g, &whole, coordinates, Order::Second);
+    let safe = [Order::First, Order::Second].into_iter().all(|order| adjoint::is_safe(g, &[value], order, true));
+    let gradients = gradients(g, value, coordinates);
     let forward_hessian = dense(forward::second_derivatives(g, value, coordinates));
     let mut alternatives = Vec::new();
     let mut offer = |name, gradient: &[NodeId], hessian: &[NodeId], safe| {
         alternatives.push(Alternative { name, nodes: [gradient, hessian].concat(), safe });
     };
-    offer("forward over forward", &forward_gradient, &forward_hessian, true);
-    if let Some(gradient) = &reverse_gradient {
+    offer("forward over forward", &gradients.forward, &forward_hessian, true);
+    if let Some(gradient) = &gradients.reverse {
         offer("forward over forward, reverse gradient", gradient, &forward_hessian, safe);
     }
     if let Some(entries) = adjoint::second_derivatives(g, &whole, coordinates) {
         let hessian = dense(entries);
-        offer("adjoint-weighted, forward gradient", &forward_gradient, &hessian, safe);
-        if let Some(gradient) = &reverse_gradient {
+        offer("adjoint-weighted, forward gradient", &gradients.forward, &hessian, safe);
+        if let Some(gradient) = &gradients.reverse {
             offer("adjoint-weighted, reverse gradient", gradient, &hessian, safe);
         }
     }
     let primitives = cut::primitives(g, value, coordinates).map(|cut| ("gathered at primitives", cut));
-    let waists = cut::waists(g, value, coordinates).into_iter().map(|cut| ("gathered at a waist", cut));
+    let waists = cut::waists(g, value, coordinates, Order::Second).into_iter();
+    let waists = waists.map(|cut| ("gathered at a waist", cut));
     let mut by_cut = cut::ByCut::new(g);
     for (name, cut) in primitives.into_iter().chain(waists) {
         if !by_cut.goes_on(g) {
             break;
         }
-        if let Some(found) = cut::derivatives(g, value, &cut, coordinates, &mut by_cut) {
-            offer(name, &found.gradient, &dense(found.hessian), found.safe);
+        let Some(found) = cut::derivatives(g, value, &cut, coordinates, &mut by_cut) else { continue };
+        let hessian = dense(found.hessian);
+        match &gradients.apart {
+            Some((gradient, is_safe)) => offer(name, gradient, &hessian, found.safe && *is_safe),
+            None => offer(name, &found.gradient, &hessian, found.safe),
         }
     }
     let (mut gradient, routes) = choose(g, routine, &[value], &alternatives);
     let hessian = gradient.split_off(n);
     (SecondOrder { value, gradient, hessian }, routes)
+}
+
+/// The first derivatives that go with second ones.
+struct Gradients {
+    forward: Vec<NodeId>,
+    /// By reverse accumulation, if that is right on the ordinary path.
+    reverse: Option<Vec<NodeId>>,
+    /// The cheapest one, and whether it is right everywhere, if first derivatives are not those of what is
+    /// differentiated twice. Otherwise, second derivatives come with their own.
+    apart: Option<(Vec<NodeId>, bool)>,
+}
+
+fn gradients(g: &mut Graph, value: NodeId, coordinates: &Coordinates) -> Gradients {
+    let is_apart = differentiable(g, &[value], Order::First).into_iter().any(|node| g.computed_as(node).is_some());
+    let order = if is_apart { Order::First } else { Order::Second };
+    let forward = forward::first_derivatives(g, &[value], coordinates, Order::First).remove(0);
+    let whole = adjoint::alone(g, value);
+    let reverse = adjoint::gradient(g, &whole, coordinates, order);
+    let apart = is_apart.then(|| {
+        let mut list = vec![(forward.clone(), true)];
+        list.extend(reverse.clone().map(|gradient| (gradient, adjoint::is_safe(g, &[value], order, true))));
+        list.extend(at_waists(g, value, coordinates));
+        list.into_iter().min_by_key(|(gradient, _)| cut::cost(g, gradient)).expect("a route exists")
+    });
+    Gradients { forward, reverse, apart }
+}
+
+/// Returns the gradients that are gathered at waists, and whether each is right everywhere.
+fn at_waists(g: &mut Graph, value: NodeId, coordinates: &Coordinates) -> Vec<(Vec<NodeId>, bool)> {
+    let waists = cut::waists(g, value, coordinates, Order::First);
+    waists.into_iter().filter_map(|cut| cut::gradient(g, value, &cut, coordinates)).collect()
 }
 
 /// Returns ∇²U · w, where w are the rates of the coordinates, by second-order reverse accumulation or from ∇²U.

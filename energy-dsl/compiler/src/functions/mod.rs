@@ -4,6 +4,7 @@
 
 mod angle;
 mod arithmetic;
+mod computed_as;
 mod decisive;
 mod dihedral;
 mod elementary;
@@ -64,6 +65,7 @@ pub fn all() -> impl Iterator<Item = &'static Function> {
     [
         arithmetic::FUNCTIONS,
         elementary::FUNCTIONS,
+        computed_as::FUNCTIONS,
         exponential::FUNCTIONS,
         trigonometric::FUNCTIONS,
         hyperbolic::FUNCTIONS,

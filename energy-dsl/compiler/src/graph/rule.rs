@@ -93,6 +93,8 @@ pub enum Primitive {
     SingularValue(u8),
     /// A function of the singular values of F.
     Spectral,
+    /// A number y in place of its definition x, which has the same value. The arguments are y and x.
+    ComputedAs,
     /// A first partial derivative of another rule.
     Partial {
         /// Node that is differentiated.
@@ -154,7 +156,7 @@ impl Primitive {
             Self::StretchTraceExcess => "tr S − 3 of a polar decomposition F = R S",
             Self::DistanceToRotation => "squared distance ‖F − R‖² to the rotation of F = R S",
             Self::SingularValue(_) | Self::Spectral => "functions of singular values",
-            Self::InnerProduct | Self::Partial { .. } | Self::SincSqrtSlope => return None,
+            Self::InnerProduct | Self::Partial { .. } | Self::SincSqrtSlope | Self::ComputedAs => return None,
         })
     }
 }
@@ -250,6 +252,21 @@ impl Graph {
         let node = self.push(Op::Rule(id), varies);
         self.rule_index.insert(key, node);
         node
+    }
+
+    /// Creates x, computed as y.
+    pub(crate) fn compute_as(&mut self, x: NodeId, y: NodeId) -> NodeId {
+        let (one, zero) = (self.constant(1.0), self.constant(0.0));
+        let first = vec![vec![one], vec![zero]];
+        let rule = Rule::factored(Primitive::ComputedAs, vec![y, x], y, first, Vec::new());
+        // `diff` takes the second derivatives of x instead.
+        self.add_rule(Rule { second: None, ..rule }, &[])
+    }
+
+    /// Returns y and x of a number y that is computed in place of x; `None` of other nodes.
+    pub(crate) fn computed_as(&self, node: NodeId) -> Option<[NodeId; 2]> {
+        let rule = self.rule(node).filter(|rule| rule.primitive == Primitive::ComputedAs)?;
+        Some([rule.arguments[0], rule.arguments[1]])
     }
 
     /// Returns the node of ∂(rule)/∂(argument `by`). It is a rule itself if second derivatives are known.
