@@ -3,6 +3,7 @@
 
 mod arrays;
 mod batch;
+mod computed_as;
 mod constants;
 mod domain;
 mod include;

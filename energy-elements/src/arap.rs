@@ -26,13 +26,16 @@ energy! {
         let f_v = F * vector(0, 1);
         let uu = norm_squared(f_u);
         let vv = norm_squared(f_v);
-        // J − 1, and I − 2.
+        let I = (uu + vv) * per_d2;
         let area = norm(cross(a, b));
+        let J = area * per_d;
+        // J − 1, and I − 2.
         let j = (area - d) * per_d;
         let i = ((uu - d2) + (vv - d2)) * per_d2;
-        // (s₁ + s₂)² = I + 2J, and (s₁² − s₂²)².
-        let square = (uu + vv) * per_d2 + 2 * area * per_d;
+        // (s₁ + s₂)², and (s₁² − s₂²)².
+        let square = I + 2 * J;
         let anisotropy = ((uu - vv) * per_d2)^2 + (2 * dot(f_u, f_v) * per_d2)^2;
-        d * μ / 8 * (((i + 2 * j) / (sqrt(square) + 2))^2 + anisotropy / square)
+        let squares = ((i + 2 * j) / (sqrt(square) + 2))^2 + anisotropy / square;
+        d * μ / 4 * computed_as(I - 2 * sqrt(square) + 2, squares / 2)
     }
 }

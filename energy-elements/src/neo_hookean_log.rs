@@ -26,18 +26,22 @@ energy! {
         let f_v = F * vector(0, 1);
         let uu = norm_squared(f_u);
         let vv = norm_squared(f_v);
-        // J − 1 and I − 2.
-        let area = norm(cross(a, b));
-        let j = (area - d) * per_d;
-        let i = ((uu - d2) + (vv - d2)) * per_d2;
         let I = (uu + vv) * per_d2;
-        // (s₁ + s₂)² = I + 2J and (s₁² − s₂²)².
-        let square = I + 2 * area * per_d;
+        let area = norm(cross(a, b));
+        let J = area * per_d;
+        // J − 1 and I − 2.
+        let j = computed_as(J - 1, (area - d) * per_d);
+        let i = ((uu - d2) + (vv - d2)) * per_d2;
+        // I − 2J from (s₁² − s₂²)² and (s₁ + s₂)² = I + 2J.
         let anisotropy = ((uu - vv) * per_d2)^2 + (2 * dot(f_u, f_v) * per_d2)^2;
-        let shape = anisotropy / square;
+        let shape = anisotropy / (I + 2 * J);
         // With x = (I − 2)/3: I − 2 − ln((I + 1)/3) = 2x − (ln(1 + x) − x). The part 4j/3 of 2x cancels; 2 shape/3
         // remains.
-        d / 4 * (μ * (2/3 * shape - log1pmx(i / 3, (I + 1) / 3)) + λ * j^2)
+        let distortion = computed_as(
+            I - 2 - log((I + 1) / 3) - 4/3 * (J - 1),
+            2/3 * shape - log1pmx(i / 3, (I + 1) / 3)
+        );
+        d / 4 * (μ * distortion + λ * j^2)
     }
 
     /// Neo-Hookean membrane on a triangle: A (μ/2 (I − 2) − μ ln J + λ/2 ln² J) with I = tr FᵀF and J = ‖w_u × w_v‖
@@ -66,16 +70,19 @@ energy! {
         let f_v = F * vector(0, 1);
         let uu = norm_squared(f_u);
         let vv = norm_squared(f_v);
-        let area = norm(cross(a, b));
-        let j = (area - d) * per_d;
-        let J = area * per_d;
-        // I, (s₁ + s₂)² = I + 2J and (s₁² − s₂²)².
         let I = (uu + vv) * per_d2;
-        let square = I + 2 * J;
+        let area = norm(cross(a, b));
+        let J = area * per_d;
+        let j = (area - d) * per_d;
+        let l = computed_as(log(J), log1p(j, J));
+        // I − 2J from (s₁² − s₂²)² and (s₁ + s₂)² = I + 2J.
         let anisotropy = ((uu - vv) * per_d2)^2 + (2 * dot(f_u, f_v) * per_d2)^2;
-        let l = log1p(j, J);
+        let shape = anisotropy / (I + 2 * J);
         // Far from rest, 2J would cancel between the two parts.
-        let distortion = if j > 1 { I - 2 - 2 * l } else { anisotropy / square - 2 * log1pmx(j, J) };
+        let distortion = computed_as(
+            I - 2 - 2 * log(J),
+            if j > 1 { I - 2 - 2 * l } else { shape - 2 * log1pmx(j, J) }
+        );
         d / 4 * (μ * distortion + λ * l^2)
     }
 }

@@ -25,13 +25,13 @@ energy! {
         let f_v = F * vector(0, 1);
         let uu = norm_squared(f_u);
         let vv = norm_squared(f_v);
-        // J − 1.
+        let I = (uu + vv) * per_d2;
         let area = norm(cross(a, b));
-        let j = (area - d) * per_d;
-        // (s₁ + s₂)² = I + 2J and (s₁² − s₂²)².
-        let square = (uu + vv) * per_d2 + 2 * area * per_d;
+        let J = area * per_d;
+        // J − 1, and I − 2J from (s₁² − s₂²)² and (s₁ + s₂)² = I + 2J.
+        let j = computed_as(J - 1, (area - d) * per_d);
         let anisotropy = ((uu - vv) * per_d2)^2 + (2 * dot(f_u, f_v) * per_d2)^2;
-        let shape = anisotropy / square;
+        let shape = computed_as(I - 2 * J, anisotropy / (I + 2 * J));
         d / 4 * (μ * shape + λ * j^2)
     }
 }

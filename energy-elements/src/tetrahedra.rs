@@ -30,7 +30,8 @@ energy! {
     /// λ and μ are those of the formula; the paper gives them in terms of Lamé's parameters: μ = 4/3 μ_Lamé and λ =
     /// λ_Lamé + 5/6 μ_Lamé. The rest shape must have a positive volume: (X1 − X0) · ((X2 − X0) × (X3 − X0)) > 0.
     ///
-    /// Terms that are linear in the strain cancel and are not computed.
+    /// In value and gradient, terms that are linear in the strain cancel and are not computed. Second derivatives are
+    /// those of the printed formula, whose sums do not cancel.
     #[audit]
     #[invariant(translation, rotation)]
     #[rest_state(zero_force)]
@@ -55,7 +56,11 @@ energy! {
         let distortion = if size < 1/4 && J > 0 { (i * j - 2 * r) / (J + 1) } else { i - 2 * j };
         // I − 3 − ln((I + 1)/4) − 3/2 (J − 1)
         let deviation = 3/4 * distortion - log1pmx(i / 4, (i + 4) / 4);
-        V / 2 * (μ * deviation + λ * j^2)
+        let I = ddot(F, F);
+        V / 2 * computed_as(
+            μ * (I - 3 - 3/2 * (J - 1) - log((I + 1) / 4)) + λ * (J - 1)^2,
+            μ * deviation + λ * j^2
+        )
     }
 
     /// As-rigid-as-possible solid on a tetrahedron (Sorkine & Alexa 2007; Chao et al. 2010, *A Simple Geometric Model

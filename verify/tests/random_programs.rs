@@ -44,6 +44,7 @@ fn scalar(depth: u32) -> BoxedStrategy<String> {
         1 => less().prop_map(|a| format!("(1 - cos({a}))")),
         1 => (less(), less()).prop_map(|(a, b)| format!("(if {a} < {b} {{ {a} * {b} }} else {{ {b} - {a} }})")),
         1 => (less(), 2..4_u8).prop_map(|(a, n)| format!("({a})^{n}")),
+        1 => (less(), less()).prop_map(|(a, b)| format!("computed_as(({a})^2 - ({b})^2, ({a} - {b}) * ({a} + {b}))")),
         2 => (vectors(), vectors()).prop_map(|(a, b)| format!("dot({a}, {b})")),
         // Exclude vectors that are zero or parallel up to rounding: lengths and angles have no derivatives there.
         1 => vectors().prop_map(|a| format!("dot(unit(q - p), unit({a} + 2 * u))")),
@@ -174,6 +175,23 @@ proptest! {
         parameters in prop::collection::vec(0.2..1.8_f64, 5),
         x in prop::collection::vec(-1.0..1.0_f64, 9),
     ) {
+        check(&formula, &parameters, &x)?;
+    }
+
+    /// Points that enter through weighted sums: one with weights that are fractions, one with others, and one that
+    /// depends on both.
+    #[test]
+    fn compiled_programs_of_sums_of_points_agree_too(
+        formula in (1..4_u32).prop_flat_map(scalar),
+        parameters in prop::collection::vec(0.2..1.8_f64, 5),
+        x in prop::collection::vec(-1.0..1.0_f64, 9),
+    ) {
+        let sums = [
+            ("(q - p)", "((p + q + r) / 3 - p)"),
+            ("(r - q)", "(0.2113248654051871 * q - r + 0.7886751345948129 * p)"),
+            ("(p - r)", "((q - p) / 6 + 0.2113248654051871 * q - 4/3 * r + 0.7886751345948129 * p + (p + q) / 6 + u)"),
+        ];
+        let formula = sums.into_iter().fold(formula, |formula, (difference, sum)| formula.replace(difference, sum));
         check(&formula, &parameters, &x)?;
     }
 }

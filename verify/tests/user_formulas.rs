@@ -49,6 +49,22 @@ fn a_jump_fails_and_a_kink_passes() {
     }
 }
 
+/// The two arguments of `computed_as` must be equal.
+#[test]
+fn a_number_that_is_computed_as_another_one_fails() {
+    let options = Options { samples: 40, truths: 2, mutations: 0, ..Options::default() };
+    for (factor, passes) in [("1", true), ("1.0000001", false)] {
+        let text = format!(
+            "#[audit] energy Gap(p, q: Point; k, L: Scalar) {{
+                 let r = norm(p - q);
+                 k * computed_as(r^2 - L^2, {factor} * (r - L) * (r + L))^2
+             }}"
+        );
+        let found = failures(&report(&text, options));
+        assert_eq!(found.is_empty(), passes, "{factor}: {found:?}");
+    }
+}
+
 /// Neighbouring doubles at the kink of a root differ by the root of roundoff.
 #[test]
 fn a_kink_with_infinite_slopes_is_no_jump() {

@@ -3,7 +3,7 @@
 use energy_compiler::Listing;
 
 /// A formula, and the most operations of its reduced Hessian.
-const FORMULAS: [(&str, usize); 10] = [
+const FORMULAS: [(&str, usize); 15] = [
     // With s = ‖d‖², ∇²U = 2 f′ I + 4 f″ d dᵀ: 6 for s, 8 for f, 12 for f′ and f″, 6 for each product, 9 for ∇U.
     ("energy LennardJones(p, q: Point; k, s: Scalar) { let r = s^2 / norm_squared(p - q); 4 * k * (r^6 - r^3) }", 70),
     // f of a length: its derivatives are scalars.
@@ -29,12 +29,58 @@ const FORMULAS: [(&str, usize); 10] = [
       }",
         260,
     ),
-    // Gaps of two midpoints: six linear functions of twelve coordinates.
+    // Gaps of two midpoints: three linear functions of twelve coordinates.
     (
         "energy Yarn(a0, a1, b0, b1: Point; k, r: Scalar) {
         let d = (a0 + a1) / 2 - (b0 + b1) / 2; k * ((r^2 / norm_squared(d))^2 + norm_squared(d) / r^2 - 2)
       }",
-        80,
+        75,
+    ),
+    // A gap and two mean edges: nine linear functions of eighteen coordinates.
+    (
+        "energy Cohesive(a0, a1, a2, b0, b1, b2: Point; k, δ: Scalar) {
+        let g = (a0 + a1 + a2 - b0 - b1 - b2) / 3;
+        let n = cross((a1 + b1 - a0 - b0) / 2, (a2 + b2 - a0 - b0) / 2);
+        let t = dot(g, unit(n)); let r = sqrt((t^2 + norm_squared(g)) / 2) / δ;
+        k * (1 - (1 + r) * exp(-r)) * norm(n) / 2
+      }",
+        940,
+    ),
+    // Three mean edges of a brick, nine linear functions of 24 coordinates.
+    (
+        "energy Brick(a, b, c, d, e, f, g, h: Point; μ, λ: Scalar) {
+        let u = (b + c + f + g - a - d - e - h) / 4; let v = (c + d + g + h - a - b - e - f) / 4;
+        let w = (e + f + g + h - a - b - c - d) / 4; let J = det(columns(u, v, w));
+        μ * (norm_squared(u) + norm_squared(v) + norm_squared(w)) / J^(2/3) + λ * (J - 1)^2
+      }",
+        480,
+    ),
+    // A Gauss point between two gaps, with weights that are no fractions.
+    (
+        "energy GaussPoint(a, b, c, d: Point; k: Scalar) {
+        let g = 0.2113248654051871 * a + 0.7886751345948129 * c - (0.2113248654051871 * b + 0.7886751345948129 * d);
+        k * norm(g)^3
+      }",
+        60,
+    ),
+    // Distances from the centre: three of the four are independent.
+    (
+        "energy Centred(a, b, c, d: Point; k: Scalar) {
+        let m = (a + b + c + d) / 4;
+        k * (norm_squared(a - m) + norm_squared(b - m) + norm(c - m) + norm(d - m)^4)
+      }",
+        140,
+    ),
+    // Second derivatives of the printed formula, value and gradient of one that does not cancel.
+    (
+        "energy ComputedAs(x0, x1, x2: Point; rest u0, u1, u2: Vec2; λ, μ: Scalar) {
+        rest { let D_m = columns(u1 - u0, u2 - u0); let B = inverse(D_m); let A = det(D_m) / 2; }
+        let F = columns(x1 - x0, x2 - x0) * B; let C = transpose(F) * F;
+        let I = trace(C); let J = norm(cross(x1 - x0, x2 - x0)) / (2 * A);
+        let s = (C[0][0] - C[1][1])^2 + 4 * C[0][1]^2;
+        A / 2 * (μ * computed_as(I - 2 * J, s / (I + 2 * J)) + λ * (J - 1)^2)
+      }",
+        320,
     ),
     // One quotient instead of nine.
     (

@@ -58,8 +58,11 @@ enum Perturbed {
     Parameters,
 }
 
-fn enters_as_edges(declaration: &Declaration) -> bool {
-    has_points(declaration) && declaration.translation_invariant
+/// Returns whether the points enter as differences of two points only.
+pub(super) fn enters_as_edges(declaration: &Declaration) -> bool {
+    let is_edge = |points: &[(usize, f64)]| matches!(points, [(_, 1.0), (_, -1.0)]);
+    let are_edges = declaration.reduced_vectors.iter().all(|points| is_edge(points));
+    has_points(declaration) && declaration.translation_invariant && are_edges
 }
 
 fn perturbed(declaration: &Declaration, sample: &Sample, what: Perturbed, random: &mut Rng) -> Sample {

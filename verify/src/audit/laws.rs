@@ -4,6 +4,7 @@
 use energy_compiler::unit_exponents;
 use energy_dsl::Kind;
 
+use super::accuracy::enters_as_edges;
 use super::auditor::{Auditor, Finding};
 use super::cases::Case;
 use super::entry::entry_name;
@@ -29,6 +30,8 @@ impl Auditor<'_> {
         self.units(&case.sample)?;
         if has_points && self.declaration.translation_invariant {
             self.momenta(case, answer);
+        }
+        if enters_as_edges(self.declaration) {
             self.translation(&case.sample)?;
         }
         if has_points && self.subject.has_velocities() {

@@ -85,15 +85,27 @@ impl Coordinates {
         let functions = Front::of_linear_functions(g, outputs, moving);
         let fewer = functions.filter(|functions| functions.span.basis.len() < differences.span.basis.len());
         let front = fewer.unwrap_or(differences);
+        // Weights of points are at most 1, so that no derivative overflows as it is expanded to points.
+        let scales: Vec<f64> = front.span.basis.iter().map(|sum| power_of_two_above(sum.largest()).max(1.0)).collect();
         let seed = |g: &mut Graph, axis: usize, sum: &Sum| -> Sparse {
-            sum.iter().map(|(vector, weight)| (3 * vector + axis, g.constant(weight))).collect()
+            sum.iter().map(|(vector, weight)| (3 * vector + axis, g.constant(weight * scales[vector]))).collect()
         };
         let seeds = front.nodes.iter().map(|(&node, (axis, sum))| (node, seed(g, *axis, sum))).collect();
         let basis = &front.span.basis;
-        let vectors = basis.iter().map(|sum| sum.iter().collect());
+        let vectors = basis.iter().zip(&scales).map(|(sum, scale)| {
+            let mut points: Vec<_> = sum.iter().map(|(point, weight)| (point, weight / scale)).collect();
+            // A difference is written as such.
+            points.sort_by(|(_, a), (_, b)| b.total_cmp(a));
+            points
+        });
         let translation_invariant = linear::is_translation_invariant(g, outputs, moving);
         Self { seeds, vectors: vectors.collect(), components: 3, translation_invariant }
     }
+}
+
+/// Returns the smallest power of two that is at least `x` > 0.
+fn power_of_two_above(x: f64) -> f64 {
+    x.log2().ceil().exp2()
 }
 
 /// Returns `sum + weight · term`.

@@ -8,7 +8,7 @@ use super::adjoint::{self, Weighted};
 use super::coordinates::Coordinates;
 use super::forward::{self, Sparse, combine, tangents};
 use super::local::Order;
-use super::{accumulate, differentiable, moving_operands};
+use super::{accumulate, differentiable, is_computed_otherwise, moving_operands};
 use crate::graph::{Graph, NodeId, Op, count, ordinary};
 
 /// The fewest nodes of a cut above which other cuts are looked for.
@@ -118,7 +118,9 @@ fn by_cut(g: &mut Graph, output: NodeId, cut: &[NodeId], known: &mut ByCut) -> G
             Gathered { gradient, hessian, safe: adjoint::is_safe(g, &[output], Order::Second, true) }
         }
         _ => {
-            let gradient = forward::first_derivatives(g, &[output], &coordinates, Order::First).remove(0);
+            // The derivatives of what is differentiated twice, which is what the cut belongs to.
+            let order = if is_computed_otherwise(g, output) { Order::Second } else { Order::First };
+            let gradient = forward::first_derivatives(g, &[output], &coordinates, order).remove(0);
             Gathered { gradient, hessian: forward::second_derivatives(g, output, &coordinates), safe: true }
         }
     };

@@ -70,7 +70,7 @@ impl Front {
                 front.add(*output, *axis, sum);
             }
         }
-        front.nodes.values().all(|(_, sum)| sum.is_within(LARGEST)).then_some(front)
+        front.nodes.values().all(|(_, sum)| sum.largest() <= LARGEST).then_some(front)
     }
 
     fn add(&mut self, node: NodeId, axis: usize, sum: &Sum) {

@@ -60,6 +60,11 @@ fn moving_operands(graph: &Graph, node: NodeId, order: Order) -> Vec<NodeId> {
     }
 }
 
+/// Returns whether first derivatives pass through other nodes than second ones.
+fn is_computed_otherwise(graph: &Graph, output: NodeId) -> bool {
+    differentiable(graph, &[output], Order::First).into_iter().any(|node| graph.computed_as(node).is_some())
+}
+
 /// Adds a term to the sum at an index.
 fn accumulate<P: Ord>(g: &mut Graph, sums: &mut BTreeMap<P, NodeId>, place: P, term: NodeId) {
     g.budget().spend(1, 0);

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::coordinates::Coordinates;
 use super::local::Order;
-use super::{adjoint, cut, differentiable, forward};
+use super::{adjoint, cut, forward, is_computed_otherwise};
 use crate::graph::{Graph, NodeId, count, ordinary, symmetric_index};
 use energy_runtime::OperationCount;
 
@@ -141,7 +141,7 @@ struct Gradients {
 }
 
 fn gradients(g: &mut Graph, value: NodeId, coordinates: &Coordinates) -> Gradients {
-    let is_apart = differentiable(g, &[value], Order::First).into_iter().any(|node| g.computed_as(node).is_some());
+    let is_apart = is_computed_otherwise(g, value);
     let order = if is_apart { Order::First } else { Order::Second };
     let forward = forward::first_derivatives(g, &[value], coordinates, Order::First).remove(0);
     let whole = adjoint::alone(g, value);

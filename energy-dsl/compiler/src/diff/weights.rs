@@ -130,9 +130,9 @@ impl Sum {
         self.0.values().fold(0, |sum, weight| (sum + weight.residue) % PRIME) == 0
     }
 
-    /// Returns whether all weights are at most `bound`.
-    pub(super) fn is_within(&self, bound: f64) -> bool {
-        self.0.values().all(|weight| weight.value.abs() <= bound)
+    /// Returns the size of the largest weight.
+    pub(super) fn largest(&self) -> f64 {
+        self.0.values().map(|weight| weight.value.abs()).fold(0.0, f64::max)
     }
 }
 
