@@ -28,6 +28,11 @@ energy! {
         [-gradient(u, p), -gradient(u, q)]
     }
 
+    energy ByValue(p, q: Point; k: Scalar) {
+        let s = norm_squared(q - p);
+        k * valued_as(2 * s, 3 * s)
+    }
+
     // Conditions and products around it, and one in another.
     energy Nested(p, q: Point; k: Scalar) {
         let j = gap(p, q, k);
@@ -68,6 +73,11 @@ fn the_value_and_the_gradient_are_of_one_and_the_curvature_of_the_other() {
     assert_relative_eq!(mixed.value, 3.0 * d.iter().map(|x| x * x).sum::<f64>(), max_relative = 1e-15);
     assert_relative_eq!(mixed.gradient[1][2], 6.0 * d[2], max_relative = 1e-15);
     assert_relative_eq!(mixed.hessian[0][0][0], 4.0, max_relative = 1e-15);
+    let by_value = ByValue::new(1.0).hessian(&P);
+    assert_relative_eq!(by_value.value, 3.0 * d.iter().map(|x| x * x).sum::<f64>(), max_relative = 1e-15);
+    assert_relative_eq!(by_value.gradient[1][2], 4.0 * d[2], max_relative = 1e-15);
+    assert_relative_eq!(by_value.hessian[0][0][0], 4.0, max_relative = 1e-15);
+    assert_relative_eq!(ByValue::new(1.0).gradient(&P).gradient[1][2], 4.0 * d[2], max_relative = 1e-15);
     assert_relative_eq!(Mixed::new(0.5).gradient(&P).gradient[1][2], 6.0 * d[2], max_relative = 1e-15);
 }
 

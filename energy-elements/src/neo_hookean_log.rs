@@ -30,7 +30,7 @@ energy! {
         let area = norm(cross(a, b));
         let J = area * per_d;
         // J − 1 and I − 2.
-        let j = computed_as(J - 1, (area - d) * per_d);
+        let j = valued_as(J - 1, (area - d) * per_d);
         let i = ((uu - d2) + (vv - d2)) * per_d2;
         // I − 2J from (s₁² − s₂²)² and (s₁ + s₂)² = I + 2J.
         let anisotropy = ((uu - vv) * per_d2)^2 + (2 * dot(f_u, f_v) * per_d2)^2;
@@ -74,7 +74,7 @@ energy! {
         let area = norm(cross(a, b));
         let J = area * per_d;
         let j = (area - d) * per_d;
-        let l = computed_as(log(J), log1p(j, J));
+        let l = valued_as(log(J), log1p(j, J));
         // I − 2J from (s₁² − s₂²)² and (s₁ + s₂)² = I + 2J.
         let anisotropy = ((uu - vv) * per_d2)^2 + (2 * dot(f_u, f_v) * per_d2)^2;
         let shape = anisotropy / (I + 2 * J);

@@ -29,7 +29,7 @@ energy! {
         let area = norm(cross(a, b));
         let J = area * per_d;
         // J − 1, and I − 2J from (s₁² − s₂²)² and (s₁ + s₂)² = I + 2J.
-        let j = computed_as(J - 1, (area - d) * per_d);
+        let j = valued_as(J - 1, (area - d) * per_d);
         let anisotropy = ((uu - vv) * per_d2)^2 + (2 * dot(f_u, f_v) * per_d2)^2;
         let shape = computed_as(I - 2 * J, anisotropy / (I + 2 * J));
         d / 4 * (μ * shape + λ * j^2)

@@ -48,19 +48,20 @@ energy! {
         let A = transpose(F) * F - identity(3);
         // I − 3, and J² − 1 = i + r.
         let i = trace(A);
-        let size = ddot(A, A);
-        let r = (i^2 - size) / 2 + det(A);
+        let second = trace(adjugate(A));
+        let r = second + det(A);
         let J = det(D) * per_d;
+        let I = valued_as(ddot(F, F), i + 3);
         // J − 1, and I − 3 − 2 (J − 1), which is quadratic in the strain. Far from rest they are computed as printed.
-        let j = if size < 1/4 && J > 0 { (i + r) / (J + 1) } else { J - 1 };
-        let distortion = if size < 1/4 && J > 0 { (i * j - 2 * r) / (J + 1) } else { i - 2 * j };
-        // I − 3 − ln((I + 1)/4) − 3/2 (J − 1)
-        let deviation = 3/4 * distortion - log1pmx(i / 4, (i + 4) / 4);
-        let I = ddot(F, F);
-        V / 2 * computed_as(
-            μ * (I - 3 - 3/2 * (J - 1) - log((I + 1) / 4)) + λ * (J - 1)^2,
-            μ * deviation + λ * j^2
-        )
+        // The squared size of A is i² − 2 second.
+        let is_near = i^2 - 2 * second < 1/4 && J > 0;
+        let j = valued_as(J - 1, if is_near { (i + r) / (J + 1) } else { J - 1 });
+        let distortion = if is_near { (i * j - 2 * r) / (J + 1) } else { i - 2 * j };
+        let deviation = computed_as(
+            I - 3 - 3/2 * (J - 1) - log((I + 1) / 4),
+            3/4 * distortion - log1pmx(i / 4, (I + 1) / 4)
+        );
+        V / 2 * (μ * deviation + λ * j^2)
     }
 
     /// As-rigid-as-possible solid on a tetrahedron (Sorkine & Alexa 2007; Chao et al. 2010, *A Simple Geometric Model

@@ -58,7 +58,7 @@ pub mod threads;
 
 pub use contact::{
     Contact, ContactCounts, ContactForces, ContactMemory, ContactModel, ContactStep, ContactsInMatrix, Pressed,
-    Presser, Resistance, Touching,
+    Presser, Resistance, SlidingStiffness, Touching,
 };
 pub use least_squares::{
     CouplingError, Couplings, GaussNewton, GaussNewtonError, GaussNewtonOptions, IterationReport, LeastSquaresTerm,

@@ -45,6 +45,7 @@ fn scalar(depth: u32) -> BoxedStrategy<String> {
         1 => (less(), less()).prop_map(|(a, b)| format!("(if {a} < {b} {{ {a} * {b} }} else {{ {b} - {a} }})")),
         1 => (less(), 2..4_u8).prop_map(|(a, n)| format!("({a})^{n}")),
         1 => (less(), less()).prop_map(|(a, b)| format!("computed_as(({a})^2 - ({b})^2, ({a} - {b}) * ({a} + {b}))")),
+        1 => (less(), less()).prop_map(|(a, b)| format!("valued_as(({a})^2 - ({b})^2, ({a} - {b}) * ({a} + {b}))")),
         2 => (vectors(), vectors()).prop_map(|(a, b)| format!("dot({a}, {b})")),
         // Exclude vectors that are zero or parallel up to rounding: lengths and angles have no derivatives there.
         1 => vectors().prop_map(|a| format!("dot(unit(q - p), unit({a} + 2 * u))")),

@@ -152,7 +152,7 @@ mod tests {
     use std::sync::{Arc, Mutex};
 
     use energy_dsl::Vector3;
-    use energy_solve::{Contact, ContactCounts, ContactForces, ContactModel, ContactStep, DofMap, Resistance};
+    use energy_solve::{Contact, ContactCounts, ContactForces, ContactModel, ContactStep, DofMap, Resistance, SlidingStiffness};
 
     use super::*;
     use crate::Simulation;
@@ -258,8 +258,8 @@ mod tests {
             self.inner.update_active_set(x, resistance)
         }
 
-        fn stiffness(&mut self, dofs: &DofMap, x: &[Vector3<f64>]) -> Vec<Vec<Contact>> {
-            self.inner.stiffness(dofs, x)
+        fn stiffness(&mut self, dofs: &DofMap, x: &[Vector3<f64>], sliding: SlidingStiffness) -> Vec<Vec<Contact>> {
+            self.inner.stiffness(dofs, x, sliding)
         }
 
         fn restrict(&mut self, moving: &[bool]) {

@@ -12,5 +12,7 @@ mod pressed;
 pub use block::Contact;
 pub(crate) use block::factors;
 pub use in_matrix::ContactsInMatrix;
-pub use model::{ContactCounts, ContactForces, ContactMemory, ContactModel, ContactStep, Resistance, Touching};
+pub use model::{
+    ContactCounts, ContactForces, ContactMemory, ContactModel, ContactStep, Resistance, SlidingStiffness, Touching,
+};
 pub use pressed::{Pressed, Presser};

@@ -54,7 +54,7 @@ pub trait ContactStep: ContactForces {
 
     /// Returns the stiffness of each active pair, and of friction, in N/m. They come in lists that several threads may
     /// take, in an order that does not depend on threads. Those of the same vertices should follow each other.
-    fn stiffness(&mut self, dofs: &DofMap, x: &[Vector3<f64>]) -> Vec<Vec<Contact>>;
+    fn stiffness(&mut self, dofs: &DofMap, x: &[Vector3<f64>], sliding: SlidingStiffness) -> Vec<Vec<Contact>>;
 
     /// Lets only these vertices move until [`ContactStep::release`], from the iterate of the last
     /// [`ContactStep::update_active_set`]. Pairs of other vertices may be left out of all sums.
@@ -70,6 +70,17 @@ pub trait ContactStep: ContactForces {
 
     /// Returns what was counted in all steps so far.
     fn counts(&self) -> ContactCounts;
+}
+
+/// The stiffness of friction along the slide. Let U(t) be the energy of a tangential displacement t.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum SlidingStiffness {
+    /// ∂²U/∂t². Newton's method converges fast with it, but it nearly vanishes for a pair that slips, so that steps are
+    /// far too long.
+    #[default]
+    Exact,
+    /// ‖∂U/∂t‖/‖t‖: the line from the origin to the force. It is never less than the exact stiffness.
+    Secant,
 }
 
 /// The resistance of vertices to displacement, in N/m, from which contact derives the stiffness of its pairs.

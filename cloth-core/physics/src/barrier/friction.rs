@@ -13,16 +13,18 @@
 use energy_dsl::{Block, Packed, Vector3};
 use energy_elements::SlidingFriction;
 use energy_solve::threads::for_each;
-use energy_solve::{Contact, ContactMemory};
+use energy_solve::{Contact, ContactMemory, SlidingStiffness};
 
 use super::PART;
 use super::bristle::{Bristles, LENGTH};
 use super::law::Law;
 use crate::collision::{Closest, CollisionMesh, Pair};
-use crate::geometry::{add_scaled, dot, subtract};
+use crate::geometry::{add_scaled, dot, norm, subtract};
 
 /// The deflection ε of a bristle at which friction is μ/√2 times the normal force, in m.
 const SOFTNESS: f64 = 0.1 * LENGTH;
+/// The displacement below which the exact stiffness is that of the secant, in m.
+const LEAST_SLIDING: f64 = 1e-3 * SOFTNESS;
 /// Why an evaluation cannot fail.
 const ONE_DISPLACEMENT: &str = "each pair has one displacement";
 
@@ -196,8 +198,11 @@ impl Friction {
     }
 
     /// Returns the stiffness of friction.
-    pub fn stiffness(&self, x: &[Vector3<f64>], threads: usize) -> FrictionStiffness<'_> {
-        let blocks = for_each(threads, self.parts().collect(), |part| part.blocks(x));
+    pub fn stiffness(&self, x: &[Vector3<f64>], sliding: SlidingStiffness, threads: usize) -> FrictionStiffness<'_> {
+        let blocks = for_each(threads, self.parts().collect(), |part| match sliding {
+            SlidingStiffness::Exact => part.blocks(x),
+            SlidingStiffness::Secant => part.secant_blocks(x),
+        });
         FrictionStiffness { pairs: self.pairs(), blocks: blocks.concat() }
     }
 
@@ -270,6 +275,22 @@ impl Part<'_> {
             .expect(ONE_DISPLACEMENT);
         blocks
     }
+
+    /// The secant stiffness of each pair: ‖∂U/∂t‖/‖t‖ across the normal.
+    fn secant_blocks(&self, x: &[Vector3<f64>]) -> Vec<Block<f64>> {
+        let mut blocks = self.blocks(x);
+        for ((one, gradient), block) in self.pairs.iter().zip(self.gradients(x)).zip(&mut blocks) {
+            let displacement = subtract(one.between(x), one.straight);
+            let sliding = norm(add_scaled(displacement, -dot(displacement, one.normal), one.normal));
+            // A bristle that is nearly straight has the same stiffness in all directions.
+            if sliding > LEAST_SLIDING {
+                let (n, stiffness) = (one.normal, norm(gradient) / sliding);
+                let entry = |i: usize, j: usize| stiffness * (f64::from(u8::from(i == j)) - n[i] * n[j]);
+                *block = [0, 1, 2].map(|i| [0, 1, 2].map(|j| entry(i, j)));
+            }
+        }
+        blocks
+    }
 }
 
 impl LaggedPair {
@@ -312,7 +333,7 @@ fn displacement(pair: &Pair, weights: &[f64; 4], anchor: Option<Anchor>, x: &[Ve
 mod tests {
     use super::*;
     use crate::collision::{Core, PairKind};
-    use crate::geometry::{Pose, norm};
+    use crate::geometry::Pose;
 
     const UP: Vector3<f64> = [0.0, 0.0, 1.0];
     /// A triangle of cloth, a triangle of an obstacle below it, and the obstacle's frame.

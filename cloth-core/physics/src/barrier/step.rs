@@ -2,7 +2,9 @@
 
 use energy_dsl::Vector3;
 use energy_solve::threads::collect;
-use energy_solve::{Contact, ContactCounts, ContactForces, ContactStep, DofMap, Pressed, Resistance};
+use energy_solve::{
+    Contact, ContactCounts, ContactForces, ContactStep, DofMap, Pressed, Resistance, SlidingStiffness,
+};
 
 use super::active_set::ActivePart;
 use super::feasible::FeasibleRegions;
@@ -166,12 +168,12 @@ impl ContactStep for BarrierStep<'_> {
         change
     }
 
-    fn stiffness(&mut self, dofs: &DofMap, x: &[Vector3<f64>]) -> Vec<Vec<Contact>> {
+    fn stiffness(&mut self, dofs: &DofMap, x: &[Vector3<f64>], sliding: SlidingStiffness) -> Vec<Vec<Contact>> {
         let BarrierContact { mesh, active, friction, neighbourhood, search, counts, .. } = &mut *self.contact;
         let rows = |pair: &Pair| {
             pair.vertices.map(|vertex| dofs.row(vertex as usize).map_or(Contact::FIXED, energy_solve::index))
         };
-        let friction = friction.stiffness(x, search.threads);
+        let friction = friction.stiffness(x, sliding, search.threads);
         let with_stiffness = |part: &ActivePart<'_>| (part.len(), stiffness::contacts(part, &friction, mesh, rows, x));
         let (active, mut contacts): (Vec<usize>, Vec<_>) =
             active.evaluate(x, Order::Curvature, search.threads, with_stiffness).into_iter().unzip();

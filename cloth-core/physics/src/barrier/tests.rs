@@ -1,6 +1,6 @@
 use energy_dsl::{Potential, Vector3};
 use energy_elements::{Distance, EdgeEdgeDistance, PointEdgeDistance, PointTriangleDistance};
-use energy_solve::{Contact, DofMap, Pressed, Presser, Resistance};
+use energy_solve::{Contact, DofMap, Pressed, Presser, Resistance, SlidingStiffness};
 use proptest::prelude::*;
 
 use super::law::Law;
@@ -113,7 +113,7 @@ fn friction_opposes_sliding() {
         // The force is minus the gradient of the energy, and the stiffness its derivative.
         let stiffness = {
             let (_, mut contact) = force_at(FRICTION, &moved);
-            step(&mut contact).stiffness(&DofMap::new(&[false; 6]), &moved).concat()
+            step(&mut contact).stiffness(&DofMap::new(&[false; 6]), &moved, SlidingStiffness::Exact).concat()
         };
         for (vertex, axis) in (3..6).flat_map(|vertex| (0..3).map(move |axis| (vertex, axis))) {
             let at = |offset: f64| {
@@ -173,7 +173,7 @@ fn the_stiffness_is_the_curvature_along_the_normal() {
     for x in states() {
         let mut contact = contact(&x);
         update(&mut contact, &x);
-        let found = step(&mut contact).stiffness(&DofMap::new(&[false; 6]), &x).concat();
+        let found = step(&mut contact).stiffness(&DofMap::new(&[false; 6]), &x, SlidingStiffness::Exact).concat();
         assert!(!found.is_empty());
         for ((pair, law, closest), one) in active(&contact, &x).into_iter().zip(&found) {
             assert_eq!((one.weights, one.rows), (closest.weights, pair.vertices));
@@ -435,8 +435,8 @@ fn threads_change_no_bit_of_many_pairs() {
             let mut force = vec![[0.0; 3]; VERTICES];
             contact.add_force(&state, &mut force);
             results.extend(force.as_flattened());
-            let contacts = step(&mut contact).stiffness(&dofs, &state).concat();
-            let sticking = contact.friction.stiffness(&state, 1).between(None, None).count();
+            let contacts = step(&mut contact).stiffness(&dofs, &state, SlidingStiffness::Exact).concat();
+            let sticking = contact.friction.stiffness(&state, SlidingStiffness::Exact, 1).between(None, None).count();
             assert!(sticking > PART, "{sticking} pairs");
             assert_eq!(contacts.len(), active(&contact, &state).len() + sticking);
             for Contact { weights, block, .. } in contacts {

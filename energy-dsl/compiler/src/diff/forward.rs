@@ -3,7 +3,7 @@ use std::collections::BTreeMap;
 use super::coordinates::Coordinates;
 use super::local::{Order, local};
 use super::{accumulate, differentiable};
-use crate::graph::{Graph, NodeId, Op};
+use crate::graph::{ComputedAs, Graph, NodeId, Op};
 
 /// Dual parts that are not identically zero, by increasing coordinate.
 pub type Sparse = Vec<(usize, NodeId)>;
@@ -51,8 +51,8 @@ pub(super) fn tangents(
         let of = |node| tangents.get(&node).unwrap_or(&none);
         let parts = match (g.op(node), g.computed_as(node)) {
             (Op::Select(mask, a, b), _) => choose(g, mask, of(a), of(b)),
-            (_, Some([computed, defined])) if order == Order::FirstToDifferentiate => {
-                joined(g, of(defined), of(computed), Graph::compute_as)
+            (_, Some(ComputedAs { computed, defined, slopes: true })) if order == Order::FirstToDifferentiate => {
+                joined(g, of(defined), of(computed), |g, x, y| g.compute_as(x, y, false))
             }
             _ => {
                 let local = local(g, node, order);

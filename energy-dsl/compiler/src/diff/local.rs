@@ -1,4 +1,4 @@
-use crate::graph::{Graph, NodeId, Op, Product, symmetric_index};
+use crate::graph::{ComputedAs, Graph, NodeId, Op, Product, symmetric_index};
 
 /// The orders of derivatives to take.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -118,8 +118,8 @@ pub(super) fn local(g: &mut Graph, node: NodeId, order: Order) -> Local {
 }
 
 fn of_rule(g: &mut Graph, node: NodeId, order: Order) -> Local {
-    if let Some([computed, defined]) = g.computed_as(node) {
-        let operand = if order == Order::Second { defined } else { computed };
+    if let Some(ComputedAs { computed, defined, slopes }) = g.computed_as(node) {
+        let operand = if slopes && order != Order::Second { computed } else { defined };
         return Local::linear(vec![operand], vec![g.constant(1.0)]);
     }
     let rule = g.rule(node).expect("a rule").clone();

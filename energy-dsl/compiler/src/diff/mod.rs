@@ -24,7 +24,7 @@ pub use routes::{Routes, SecondOrder, first_order, hessian_vector, second_order}
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::graph::{Graph, NodeId, Op};
+use crate::graph::{ComputedAs, Graph, NodeId, Op};
 
 /// Returns the nodes through which `outputs` depend on moving inputs, in topological order.
 fn differentiable(graph: &Graph, outputs: &[NodeId], order: Order) -> BTreeSet<NodeId> {
@@ -42,11 +42,11 @@ fn differentiable(graph: &Graph, outputs: &[NodeId], order: Order) -> BTreeSet<N
 /// Returns the nodes that a node is differentiated by. A rule has its arguments, or its value if only that can be
 /// differentiated. Masks and rounding errors have no derivatives.
 fn moving_operands(graph: &Graph, node: NodeId, order: Order) -> Vec<NodeId> {
-    if let Some([computed, defined]) = graph.computed_as(node) {
+    if let Some(ComputedAs { computed, defined, slopes }) = graph.computed_as(node) {
         return match order {
-            Order::First => vec![computed],
-            Order::FirstToDifferentiate => vec![computed, defined],
-            Order::Second => vec![defined],
+            Order::First if slopes => vec![computed],
+            Order::FirstToDifferentiate if slopes => vec![computed, defined],
+            _ => vec![defined],
         };
     }
     match graph.rule(node) {
@@ -62,7 +62,8 @@ fn moving_operands(graph: &Graph, node: NodeId, order: Order) -> Vec<NodeId> {
 
 /// Returns whether first derivatives pass through other nodes than second ones.
 fn is_computed_otherwise(graph: &Graph, output: NodeId) -> bool {
-    differentiable(graph, &[output], Order::First).into_iter().any(|node| graph.computed_as(node).is_some())
+    let slopes = |node| graph.computed_as(node).is_some_and(|number| number.slopes);
+    differentiable(graph, &[output], Order::First).into_iter().any(slopes)
 }
 
 /// Adds a term to the sum at an index.

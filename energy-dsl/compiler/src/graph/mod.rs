@@ -26,7 +26,7 @@ pub use node::{Input, NodeId, Op};
 pub use ordinary::{Assumption, general, ordinary};
 pub(crate) use origin::Origin;
 pub use recognise::{Ending, Expansion, Recogniser};
-pub(crate) use rule::upper;
+pub(crate) use rule::{ComputedAs, upper};
 pub use rule::{DihedralParts, Primitive, Product, Rule, symmetric_index};
 pub use signs::with_signs_inside;
 pub(crate) use spectrum::{Dependence, Spectrum};

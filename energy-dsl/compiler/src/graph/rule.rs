@@ -93,8 +93,12 @@ pub enum Primitive {
     SingularValue(u8),
     /// A function of the singular values of F.
     Spectral,
-    /// A number y in place of its definition x, which has the same value. The arguments are y and x.
-    ComputedAs,
+    /// A number y in place of its definition x, which has the same value. The arguments are y and x. If `slopes`, first
+    /// derivatives are those of y, too.
+    ComputedAs {
+        /// Whether first derivatives are those of y.
+        slopes: bool,
+    },
     /// A first partial derivative of another rule.
     Partial {
         /// Node that is differentiated.
@@ -156,7 +160,7 @@ impl Primitive {
             Self::StretchTraceExcess => "tr S − 3 of a polar decomposition F = R S",
             Self::DistanceToRotation => "squared distance ‖F − R‖² to the rotation of F = R S",
             Self::SingularValue(_) | Self::Spectral => "functions of singular values",
-            Self::InnerProduct | Self::Partial { .. } | Self::SincSqrtSlope | Self::ComputedAs => return None,
+            Self::InnerProduct | Self::Partial { .. } | Self::SincSqrtSlope | Self::ComputedAs { .. } => return None,
         })
     }
 }
@@ -203,6 +207,15 @@ pub struct Rule {
 /// Factors that are multiplied from left to right. A weight multiplies the first factor, so that entries which share
 /// leading factors also share these products.
 pub type Product = Vec<NodeId>;
+
+/// A number that is computed by another expression than the one that defines it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct ComputedAs {
+    pub computed: NodeId,
+    pub defined: NodeId,
+    /// Whether first derivatives are those of the expression that computes it.
+    pub slopes: bool,
+}
 
 /// Functions of a dihedral angle that do not need the angle.
 #[derive(Clone, Copy, Debug)]
@@ -254,19 +267,20 @@ impl Graph {
         node
     }
 
-    /// Creates x, computed as y.
-    pub(crate) fn compute_as(&mut self, x: NodeId, y: NodeId) -> NodeId {
+    /// Creates x, computed as y; with its slopes, or its value only.
+    pub(crate) fn compute_as(&mut self, x: NodeId, y: NodeId, slopes: bool) -> NodeId {
         let (one, zero) = (self.constant(1.0), self.constant(0.0));
-        let first = vec![vec![one], vec![zero]];
-        let rule = Rule::factored(Primitive::ComputedAs, vec![y, x], y, first, Vec::new());
-        // `diff` takes the second derivatives of x instead.
+        let first = if slopes { [one, zero] } else { [zero, one] }.map(|slope| vec![slope]);
+        let rule = Rule::factored(Primitive::ComputedAs { slopes }, vec![y, x], y, first.to_vec(), Vec::new());
+        // `diff` takes the derivatives of x instead.
         self.add_rule(Rule { second: None, ..rule }, &[])
     }
 
-    /// Returns y and x of a number y that is computed in place of x; `None` of other nodes.
-    pub(crate) fn computed_as(&self, node: NodeId) -> Option<[NodeId; 2]> {
-        let rule = self.rule(node).filter(|rule| rule.primitive == Primitive::ComputedAs)?;
-        Some([rule.arguments[0], rule.arguments[1]])
+    /// Returns what stands in place of what, if the node is such a number.
+    pub(crate) fn computed_as(&self, node: NodeId) -> Option<ComputedAs> {
+        let rule = self.rule(node)?;
+        let Primitive::ComputedAs { slopes } = rule.primitive else { return None };
+        Some(ComputedAs { computed: rule.arguments[0], defined: rule.arguments[1], slopes })
     }
 
     /// Returns the node of ∂(rule)/∂(argument `by`). It is a rule itself if second derivatives are known.

@@ -3,16 +3,11 @@
 use std::time::Instant;
 
 use energy_dsl::Vector3;
-use energy_solve::{BlockMatrix, Contact, Pressed, Resistance};
+use energy_solve::{BlockMatrix, Contact, Pressed, Resistance, SlidingStiffness};
 
 use super::super::ContactWork;
 use super::incremental_potential::IncrementalPotential;
-
-/// Moves of pins and obstacles within a step, after which they count as blocked.
-pub(super) const PIN_MOVES: usize = 60;
-/// The part of a certified way that pins and obstacles go if they cannot go all the way. An iteration of Newton's
-/// method doubles a small gap. If pins took more than half of it, gaps would shrink until barriers overflow.
-const PIN_SHARE: f64 = 0.5;
+use super::pins::shared;
 
 impl IncrementalPotential<'_> {
     /// Shortens the move to the first iterate x until it is certain to have no crossing. Returns the part of their way
@@ -84,9 +79,9 @@ impl IncrementalPotential<'_> {
     }
 
     /// Returns the stiffness of the contacts, in N/m.
-    pub(super) fn contacts(&mut self, x: &[Vector3<f64>]) -> Vec<Vec<Contact>> {
+    pub(super) fn contacts(&mut self, x: &[Vector3<f64>], sliding: SlidingStiffness) -> Vec<Vec<Contact>> {
         let Some(contact) = &mut self.contact else { return Vec::new() };
-        let contacts = contact.stiffness(self.body.system.dofs(), x);
+        let contacts = contact.stiffness(self.body.system.dofs(), x, sliding);
         self.report.contact = ContactWork::between(&self.counted, &contact.counts());
         contacts
     }
@@ -98,23 +93,6 @@ impl IncrementalPotential<'_> {
         self.contact.iter_mut().for_each(|contact| contact.release());
         done
     }
-
-    /// Moves pins and obstacles that contact has stopped further towards their positions at the end of the step.
-    /// Returns the part of the rest of their way that they went.
-    pub(super) fn move_pins(&mut self, x: &mut [Vector3<f64>]) -> f64 {
-        let mut to = x.to_vec();
-        for vertex in (0..x.len()).filter(|&vertex| self.body.system.dofs().row(vertex).is_none()) {
-            to[vertex] = self.inertial(vertex);
-        }
-        let part = shared(self.filter_step(x, &to));
-        blend(x, &to, part);
-        part
-    }
-}
-
-/// The part of the way that pins and obstacles go, of the certified part.
-fn shared(certified: f64) -> f64 {
-    if certified == 1.0 { 1.0 } else { PIN_SHARE * certified }
 }
 
 /// x ← x + s (y − x); exactly y for s = 1.

@@ -148,6 +148,26 @@ impl<'a> IncrementalPotential<'a> {
         Ok(downhill)
     }
 
+    /// Returns ∇E of all vertices, with contact. Pinned vertices have no inertia.
+    pub(super) fn whole_gradient(&mut self, x: &[Vector3<f64>]) -> Result<Vec<Vector3<f64>>, EvaluationError> {
+        let started = Instant::now();
+        let Body { system, x: start, v: before, .. } = &mut *self.body;
+        let v = velocities_if_needed(system, before, || velocities(x, start, self.dt));
+        let mut gradient = system.forces(State { x, v: &v })?;
+        if let Some(contact) = &self.contact {
+            contact.add_force(x, &mut gradient);
+        }
+        gradient.iter_mut().flatten().for_each(|component| *component *= -self.dt * self.dt);
+        for &vertex in self.body.system.dofs().free() {
+            let (mass, inertial) = (self.body.masses[vertex], self.inertial(vertex));
+            for axis in 0..3 {
+                gradient[vertex][axis] += mass * (x[vertex][axis] - inertial[axis]);
+            }
+        }
+        self.report.phases.assembly += started.elapsed();
+        Ok(gradient)
+    }
+
     /// Returns M (x̂ − x) + h² f of the free vertices, in place of the forces on all vertices.
     fn downhill(&self, x: &[Vector3<f64>], mut force: Vec<Vector3<f64>>) -> Vec<Vector3<f64>> {
         let free = self.body.system.dofs().free();

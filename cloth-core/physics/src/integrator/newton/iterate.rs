@@ -1,13 +1,14 @@
 use std::time::Instant;
 
 use energy_dsl::Vector3;
-use energy_solve::{Curvature, EvaluationError, OverRelaxation, Pressed, SolveOptions, SolveReport, StopReason, dot};
+use energy_solve::{
+    Curvature, EvaluationError, OverRelaxation, Pressed, SlidingStiffness, SolveOptions, SolveReport, StopReason, dot,
+};
 
 use super::super::projection::{Progress, Projection};
 use super::super::trial::Trial;
 use super::super::{StepError, StepReport};
 use super::forcing::Forcing;
-use super::in_contact::PIN_MOVES;
 use super::incremental_potential::{Energy, EnergyAndGradient, IncrementalPotential};
 use super::line_search::{AcceptedStep, Prefetch};
 use super::local::Few;
@@ -15,31 +16,36 @@ use super::{Memory, NewtonOptions, largest};
 
 /// The current iterate of a step, with the quantities evaluated there.
 pub(super) struct Iterate<'a> {
-    options: NewtonOptions,
-    potential: IncrementalPotential<'a>,
+    pub(super) options: NewtonOptions,
+    pub(super) potential: IncrementalPotential<'a>,
     memory: &'a mut Memory,
     trial: &'a mut Trial,
-    projection: Projection,
-    x: Vec<Vector3<f64>>,
-    energy: Energy,
+    pub(super) projection: Projection,
+    pub(super) x: Vec<Vector3<f64>>,
+    pub(super) energy: Energy,
     /// −∇E at x, if it is known but the Hessian is not.
-    gradient: Option<Vec<Vector3<f64>>>,
+    pub(super) gradient: Option<Vec<Vector3<f64>>>,
     /// −∇E at x, if the matrix holds the exact Hessian at x.
-    linearised: Option<Vec<Vector3<f64>>>,
+    pub(super) linearised: Option<Vec<Vector3<f64>>>,
     /// The accuracy of the last linear system.
     last: Option<Forcing>,
     /// The largest change of a velocity component in the last iteration, in m/s.
-    change: f64,
+    pub(super) change: f64,
     /// Whether the last line search took a full step; the next one then probably will.
-    took_full_step: bool,
+    pub(super) took_full_step: bool,
     converged: bool,
     /// The part of their way that pins have gone; below 1 if contact stopped them.
-    pins: f64,
+    pub(super) pins: f64,
     /// Moves of pins that contact had stopped.
-    pin_moves: usize,
+    pub(super) pin_moves: usize,
     /// `false` once a term turned out not to be restrictable.
     may_eliminate: bool,
+    /// Iterations that still take the secant stiffness of friction.
+    pub(super) secants: u32,
 }
+
+/// Iterations that take the secant stiffness of friction after a step that contact or the line search shortened.
+pub(super) const SECANTS: u32 = 3;
 
 /// A search direction.
 pub(super) struct Direction {
@@ -116,6 +122,7 @@ impl<'a> Iterate<'a> {
             pins,
             pin_moves: 0,
             may_eliminate: true,
+            secants: 0,
         })
     }
 
@@ -129,6 +136,9 @@ impl<'a> Iterate<'a> {
             }
             if self.is_balanced()? {
                 break;
+            }
+            if self.pins < 1.0 && self.follow_pins()? {
+                continue;
             }
             let direction = self.direction()?;
             let few = self.few_that_move(&direction);
@@ -158,7 +168,7 @@ impl<'a> Iterate<'a> {
     }
 
     /// Returns where contact presses the most, if it shortened a move of this step.
-    fn pressed(&self) -> Option<Pressed> {
+    pub(super) fn pressed(&self) -> Option<Pressed> {
         let is_shortened = self.potential.report.contact.shortened > 0;
         is_shortened.then(|| self.potential.most_pressed(&self.x)).flatten()
     }
@@ -180,28 +190,34 @@ impl<'a> Iterate<'a> {
 
     /// Assembles the Hessian, unless it is known, and solves for the search direction.
     fn direction(&mut self) -> Result<Direction, StepError> {
-        let (curvature, is_projected) = (self.projection.curvature, !self.projection.is_exact());
-        let mut downhill = match self.linearised.take().filter(|_| !is_projected) {
-            Some(downhill) => downhill,
-            None => self.potential.linearise(&self.x, curvature, &mut self.memory.matrix)?,
-        };
-        self.potential.add_contact(&self.x, &mut downhill);
+        let curvature = self.projection.curvature;
+        let downhill = self.linearise()?;
         let forcing = self.options.forcing(largest(&downhill), self.last);
         self.last = Some(forcing);
         let (vectors, solved) = self.solve(&downhill, curvature, forcing.tolerance)?;
         Ok(Direction::new(&downhill, vectors, curvature, forcing, solved))
     }
 
+    /// Assembles the Hessian, unless it is known, and returns −∇E.
+    pub(super) fn linearise(&mut self) -> Result<Vec<Vector3<f64>>, EvaluationError> {
+        let mut downhill = match self.linearised.take().filter(|_| self.projection.is_exact()) {
+            Some(downhill) => downhill,
+            None => self.potential.linearise(&self.x, self.projection.curvature, &mut self.memory.matrix)?,
+        };
+        self.potential.add_contact(&self.x, &mut downhill);
+        Ok(downhill)
+    }
+
     /// Solves H d = −∇E. If an exact Hessian turns out to be indefinite, returns the truncated direction of conjugate
     /// gradients: a descent direction, or zero.
-    fn solve(
+    pub(super) fn solve(
         &mut self,
         downhill: &[Vector3<f64>],
         curvature: Curvature,
         relative_tolerance: f64,
     ) -> Result<(Vec<Vector3<f64>>, SolveReport), StepError> {
         let options = SolveOptions::new(relative_tolerance);
-        let contacts = self.potential.contacts(&self.x);
+        let contacts = self.potential.contacts(&self.x, self.sliding());
         let (scale, threads) = (self.potential.dt * self.potential.dt, self.potential.body.system.threads());
         let Memory { matrix, solver } = &mut *self.memory;
         let started = Instant::now();
@@ -242,12 +258,17 @@ impl<'a> Iterate<'a> {
     ) -> Result<SolveReport, StepError> {
         let mut matrix = self.potential.body.system.matrix();
         self.potential.linearise(&self.x, curvature, &mut matrix)?;
-        let contacts = self.potential.contacts(&self.x);
+        let contacts = self.potential.contacts(&self.x, self.sliding());
         let (scale, threads) = (self.potential.dt * self.potential.dt, self.potential.body.system.threads());
         let contacts = matrix.add_contacts(&contacts, scale, threads);
         let mut solver = OverRelaxation::<f64>::with_threads(matrix.pattern(), threads);
         solver.scale_with_contacts(&matrix, &contacts.others)?;
         Ok(solver.solve(downhill, direction, options))
+    }
+
+    /// How friction enters the Hessian.
+    fn sliding(&self) -> SlidingStiffness {
+        if self.secants > 0 { SlidingStiffness::Secant } else { SlidingStiffness::Exact }
     }
 
     /// Returns the vertices to eliminate after a step along the direction; `None` if all are to move together, or the
@@ -292,29 +313,12 @@ impl<'a> Iterate<'a> {
         self.potential.line_search(&self.x, self.energy, direction, prefetch)
     }
 
-    /// Lets pins that contact has stopped move on, now that the cloth made way.
-    fn move_pins(&mut self) -> Result<(), StepError> {
-        if self.pins == 1.0 {
-            return Ok(());
-        }
-        if self.pin_moves == PIN_MOVES {
-            let pressed = self.potential.most_pressed(&self.x);
-            return Err(StepError::PinsBlocked { moves: PIN_MOVES, part: self.pins, pressed });
-        }
-        self.pin_moves += 1;
-        let part = self.potential.move_pins(&mut self.x);
-        self.pins = if part == 1.0 { 1.0 } else { self.pins + (1.0 - self.pins) * part };
-        self.potential.update_active_set(&self.x);
-        self.energy = self.potential.energy(&self.x)?;
-        (self.gradient, self.linearised) = (None, None);
-        Ok(())
-    }
-
     /// Moves to the next iterate, tests for convergence, and decides whether the next Hessian is projected.
     fn accept(&mut self, step: AcceptedStep, direction: &Direction) {
         self.potential.advance(&mut self.x, step.scale, &direction.vectors);
         (self.energy, self.gradient, self.linearised) = (step.energy, step.gradient, step.linearised);
         self.took_full_step = step.scale >= step.allowed;
+        self.secants = if step.scale < 1.0 { SECANTS } else { self.secants.saturating_sub(1) };
         let change = step.scale * direction.length / self.potential.dt;
         let before = std::mem::replace(&mut self.change, change);
         let is_solution = direction.is_projected || direction.solved.converged();

@@ -16,7 +16,9 @@
 use std::time::Instant;
 
 use energy_dsl::Vector3;
-use energy_solve::{BlockMatrix, Curvature, EvaluationError, OverRelaxation, SolveOptions, SolveReport};
+use energy_solve::{
+    BlockMatrix, Curvature, EvaluationError, OverRelaxation, SlidingStiffness, SolveOptions, SolveReport,
+};
 
 use super::forcing::Forcing;
 use super::incremental_potential::IncrementalPotential;
@@ -127,7 +129,7 @@ impl IncrementalPotential<'_> {
     ) -> Result<Direction, EvaluationError> {
         let mut downhill = self.linearise(x, curvature, matrix)?;
         self.add_contact(x, &mut downhill);
-        let contacts = self.contacts(x);
+        let contacts = self.contacts(x, SlidingStiffness::Exact);
         let (scale, threads) = (self.dt * self.dt, self.body.system.threads());
         let started = Instant::now();
         let contacts = matrix.add_contacts(&contacts, scale, threads);

@@ -4,6 +4,7 @@ mod incremental_potential;
 mod iterate;
 mod line_search;
 mod local;
+mod pins;
 
 use std::time::Duration;
 
