@@ -7,6 +7,8 @@ use crate::body::Body;
 /// Adaptive step sizes for another integrator. A failed step is rejected and retried at half its size. After
 /// [`Adaptive::PATIENCE`] successes in a row the size doubles, up to the requested one.
 ///
+/// The report counts the work of rejected steps, too.
+///
 /// A step fails if it cannot be completed with finite numbers: NaN, an inverted triangle under a material that forbids
 /// it, a line search without success, too many iterations.
 #[derive(Debug)]
@@ -72,6 +74,7 @@ impl Integrator for Adaptive {
                     }
                 }
                 Err(reason) => {
+                    report += self.inner.take_failed_work();
                     let rejection = Rejection { dt: size, reason: reason.clone() };
                     let first = first.get_or_insert_with(|| rejection.clone());
                     self.last_rejection = Some(rejection);

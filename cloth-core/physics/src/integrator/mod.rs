@@ -54,6 +54,11 @@ pub trait Integrator: std::fmt::Debug + Send {
     /// Returns an error if the step cannot be completed with finite numbers.
     fn step(&mut self, body: &mut Body, dt: f64) -> Result<StepReport, StepError>;
 
+    /// Returns the work of the steps that failed since the last call. Default none: it is not counted.
+    fn take_failed_work(&mut self) -> StepReport {
+        StepReport::default()
+    }
+
     /// Returns the history that later steps depend on, for a checkpoint.
     fn memory(&self) -> IntegratorMemory {
         IntegratorMemory::default()

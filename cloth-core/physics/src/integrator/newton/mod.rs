@@ -49,6 +49,8 @@ pub struct Newton {
     trial: Trial,
     warm_start: WarmStart,
     memory: Option<Memory>,
+    /// The work of steps that failed.
+    failed: StepReport,
 }
 
 /// Stopping criteria of a step, and the accuracy of its linear systems.
@@ -141,8 +143,12 @@ impl Newton {
         let x = self.warm_start.begin(body, dt);
         let potential = IncrementalPotential::new(body, contact, dt);
         let mut iterate = Iterate::new(self.options, potential, &mut memory, &mut self.trial, x)?;
-        iterate.converge()?;
+        let converged = iterate.converge();
         let (x, report) = iterate.into_result();
+        if let Err(reason) = converged {
+            self.failed += report;
+            return Err(reason);
+        }
         let v = incremental_potential::velocities(&x, &body.x, dt);
         self.warm_start = WarmStart::after(body, &v, dt, report.solves);
         (body.x, body.v) = (x, v);
@@ -163,6 +169,10 @@ impl Integrator for Newton {
         let report = self.minimise(body, step, dt);
         contact.into_iter().for_each(|contact| body.system.set_contact(contact));
         report
+    }
+
+    fn take_failed_work(&mut self) -> StepReport {
+        std::mem::take(&mut self.failed)
     }
 
     fn memory(&self) -> IntegratorMemory {
