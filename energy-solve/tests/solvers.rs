@@ -158,6 +158,10 @@ fn limits_zero_loads_and_broken_numbers_are_reported() {
         let (x, idle) = solve(solver, &matrix, &[[0.0; 3]; ROWS], &few);
         assert!(idle.converged() && idle.iterations == 0 && x == vec![[0.0; 3]; ROWS]);
         assert_eq!(solve(solver, &matrix, &broken, &few).1.stopped, StopReason::NonFinite);
+        let mut holed = matrix.clone();
+        let (slot, _) = matrix.pattern().slot(3, 4).unwrap();
+        holed.values_mut()[slot][0][1] = f64::NAN;
+        assert_eq!(solve(solver, &holed, &right_hand_side(), &few).1.stopped, StopReason::NonFinite);
     }
 }
 
