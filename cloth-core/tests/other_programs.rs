@@ -1,4 +1,4 @@
-//! Programs of others that judge files. Tests that need them are skipped where they are missing.
+//! Programs of others that check files. Tests that need them are skipped where they are missing.
 
 use std::path::Path;
 use std::process::Command;

@@ -124,9 +124,9 @@ pub(super) fn scenes() -> u32 {
     std::env::var("PROPTEST_CASES").ok().and_then(|cases| cases.parse().ok()).unwrap_or(SCENES)
 }
 
-/// Runs a scene. Nothing crosses, all positions are finite, and a step fails only if the scene may demand the
+/// Runs a scene, and checks it: nothing crosses, all positions are finite, and a step fails only if the scene may demand the
 /// impossible.
-pub(super) fn judge(dt: f64, rest: &str, may_be_impossible: bool) -> Result<(), TestCaseError> {
+pub(super) fn check_run(dt: f64, rest: &str, may_be_impossible: bool) -> Result<(), TestCaseError> {
     let text = format!(
         "dt = {dt:?}\nduration = 10.0\nintegrator = \"newton\"\ncontact = \"on\"\nadaptive = true\n\
          tolerances.velocity = 1e-3\ndrag = 0.5\n{rest}"
@@ -155,6 +155,6 @@ proptest! {
         dt in 0.001..0.033_f64,
         (text, may_be_impossible) in scene(),
     ) {
-        judge(dt, &text, may_be_impossible)?;
+        check_run(dt, &text, may_be_impossible)?;
     }
 }

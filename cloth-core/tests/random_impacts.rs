@@ -126,7 +126,7 @@ fn is_above_net(simulation: &Simulation, p: [f64; 3]) -> bool {
 }
 
 /// Runs an impact. Returns whether the patch met anything, or an error if it passed.
-fn judge(Impact { text, target, steps }: &Impact) -> Result<bool, TestCaseError> {
+fn check_impact(Impact { text, target, steps }: &Impact) -> Result<bool, TestCaseError> {
     let scene = Scene::parse(text, "impact.toml".as_ref()).unwrap_or_else(|error| panic!("{error}"));
     let mut simulation = Simulation::new(&scene).unwrap_or_else(|error| panic!("{error}"));
     let patch = simulation.parts()[0].vertices.clone();
@@ -159,7 +159,7 @@ fn no_random_impact_passes() {
     let config = Config { cases: impacts, failure_persistence: None, ..Config::default() };
     TestRunner::new(config)
         .run(&impact(), |impact| {
-            hits.set(hits.get() + u32::from(judge(&impact)?));
+            hits.set(hits.get() + u32::from(check_impact(&impact)?));
             Ok(())
         })
         .unwrap_or_else(|error| panic!("{error}"));

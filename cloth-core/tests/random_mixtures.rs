@@ -1,11 +1,11 @@
 //! Random scenes of what collides less often than cloth does: hair, seams, exclusions, meshes that turn, and pins that
-//! let go. They are judged as those of `random_contact.rs`.
+//! let go. They are checked as those of `random_contact.rs`.
 //!
 //! `PROPTEST_CASES=8000 cargo test --release -p cloth-core --test all random_mixtures::` runs a hundred thousand steps.
 
 use proptest::prelude::*;
 
-use super::random_contact::{fabric, judge, scenes, sheet, vector};
+use super::random_contact::{check_run, fabric, scenes, sheet, vector};
 
 /// Strands of hair, fixed at their roots or loose.
 fn hair(rooted: bool) -> impl Strategy<Value = String> {
@@ -110,6 +110,6 @@ proptest! {
         dt in 0.001..0.033_f64,
         (text, may_be_impossible) in prop_oneof![hair_and_cloth(), sewn(), excluded(), released()],
     ) {
-        judge(dt, &text, may_be_impossible)?;
+        check_run(dt, &text, may_be_impossible)?;
     }
 }

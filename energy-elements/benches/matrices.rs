@@ -18,11 +18,8 @@ const COUNT: usize = 10_000;
 const POINTS: usize = 4;
 
 fn main() {
-    let mut state = 5_u64;
-    let mut draw = || {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (state >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
-    };
+    let mut random = fastrand::Rng::with_seed(5);
+    let mut draw = || 2.0 * random.f64() - 1.0;
     let x: Vec<Vector3<f64>> = (0..COUNT * POINTS).map(|_| std::array::from_fn(|_| draw())).collect();
     let hinge: QuadraticHinge = QuadraticHinge::new(1.5, 0.25);
     let hinges = Packed::from_fn(COUNT, POINTS, |_| &hinge, |i, point| (POINTS * i + point) as u32);

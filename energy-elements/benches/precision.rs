@@ -29,11 +29,8 @@ struct Case<E: PackedPotential<S>, S: Float> {
 impl<E: PackedPotential<S>, S: Float> Case<E, S> {
     /// Places equal elements around some points, moved by up to 0.2 along each axis.
     fn new<const N: usize>(element: &E, around: [[f64; 3]; N]) -> Self {
-        let mut state = 5_u64;
-        let mut draw = || {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            (state >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
-        };
+        let mut random = fastrand::Rng::with_seed(5);
+        let mut draw = || 2.0 * random.f64() - 1.0;
         let point = |i: usize| from_fn(|axis| S::from_f64(around[i % N][axis] + 0.2 * draw()));
         let zeros = |count: usize| vec![S::from_f64(0.0); count];
         Self {

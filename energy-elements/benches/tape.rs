@@ -21,11 +21,8 @@ const COUNT: usize = 512;
 
 /// Returns random numbers from −1 to 1.
 fn numbers() -> impl FnMut() -> f64 {
-    let mut state = 5_u64;
-    move || {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (state >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
-    }
+    let mut random = fastrand::Rng::with_seed(5);
+    move || 2.0 * random.f64() - 1.0
 }
 
 /// Returns a sound rest shape.

@@ -16,11 +16,8 @@ const COUNT: usize = 50;
 
 /// Numbers in (−1, 1).
 fn numbers(seed: u64) -> impl FnMut() -> f64 {
-    let mut state = seed;
-    move || {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (state >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
-    }
+    let mut random = fastrand::Rng::with_seed(seed);
+    move || 2.0 * random.f64() - 1.0
 }
 
 /// Adds lines with inputs and results at random points. `element` draws an element and returns its parameters, too.

@@ -13,11 +13,8 @@ use energy_elements::{
 const COUNT: usize = 21;
 
 fn numbers(seed: u64) -> impl FnMut() -> f64 {
-    let mut state = seed;
-    move || {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (state >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
-    }
+    let mut random = fastrand::Rng::with_seed(seed);
+    move || 2.0 * random.f64() - 1.0
 }
 
 /// Ordinary points. Every fifth element has coincident points, every seventh tiny ones.

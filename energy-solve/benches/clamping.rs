@@ -76,10 +76,9 @@ fn bricks(count: usize) -> Box<dyn Term> {
 
 /// Prints the times of elements whose points are `around` some place, up to a `spread` in each direction.
 fn compare<const N: usize>(name: &str, term: &dyn Fn(usize) -> Box<dyn Term>, around: [Vector3<f64>; N], spread: f64) {
-    let mut random = Random(1);
-    let shapes: Vec<[Vector3<f64>; N]> = (0..COUNT)
-        .map(|_| around.map(|point| point.map(|x| x + spread * random.between_minus_one_and_one())))
-        .collect();
+    let mut random = fastrand::Rng::with_seed(1);
+    let shapes: Vec<[Vector3<f64>; N]> =
+        (0..COUNT).map(|_| around.map(|point| point.map(|x| x + spread * (2.0 * random.f64() - 1.0)))).collect();
     let (indefinite, definite): (Vec<_>, Vec<_>) =
         shapes.iter().zip(least_eigenvalues(term(COUNT), &shapes)).partition(|(_, least)| *least < -1e-9);
     if indefinite.is_empty() {
@@ -141,14 +140,4 @@ fn assembled(term: Box<dyn Term>, x: &[Vector3<f64>], curvature: Curvature) -> f
 fn options(curvature: Curvature) -> LinearisationOptions {
     let weights = Weights { position: -1.0, velocity: 0.0 };
     LinearisationOptions::new(weights, curvature)
-}
-
-/// A linear congruential generator.
-struct Random(u64);
-
-impl Random {
-    fn between_minus_one_and_one(&mut self) -> f64 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
-    }
 }

@@ -20,11 +20,8 @@ fn pattern(storage: Storage) -> Arc<Pattern> {
 fn matrix(diagonal: f64, skew: f64) -> BlockMatrix {
     let pattern = pattern(if skew == 0.0 { Storage::Upper } else { Storage::Whole });
     let mut matrix = BlockMatrix::zeros(Arc::clone(&pattern));
-    let mut seed = 1_u64;
-    let mut number = || {
-        seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (seed >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
-    };
+    let mut random = fastrand::Rng::with_seed(1);
+    let mut number = || random.f64() - 0.5;
     for row in 0..ROWS {
         for column in (row..ROWS).filter(|&column| pattern.slot(row, column).is_some()) {
             for i in 0..3 {
@@ -161,6 +158,10 @@ fn limits_zero_loads_and_broken_numbers_are_reported() {
         let (x, idle) = solve(solver, &matrix, &[[0.0; 3]; ROWS], &few);
         assert!(idle.converged() && idle.iterations == 0 && x == vec![[0.0; 3]; ROWS]);
         assert_eq!(solve(solver, &matrix, &broken, &few).1.stopped, StopReason::NonFinite);
+        let mut holed = matrix.clone();
+        let (slot, _) = matrix.pattern().slot(3, 4).unwrap();
+        holed.values_mut()[slot][0][1] = f64::NAN;
+        assert_eq!(solve(solver, &holed, &right_hand_side(), &few).1.stopped, StopReason::NonFinite);
     }
 }
 

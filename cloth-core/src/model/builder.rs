@@ -33,7 +33,7 @@ pub(super) struct Builder<'a> {
     pieces: Vec<Piece>,
     /// The spring network of each garment, for mass–spring fabrics.
     springs: Vec<SpringNetwork>,
-    homes: Vec<Home>,
+    locations: Vec<Location>,
 }
 
 /// A connected component of a part, before seams join it to others.
@@ -45,9 +45,9 @@ struct Piece {
 
 /// The location of a vertex: its island, and its index within the island.
 #[derive(Clone, Copy, Default)]
-struct Home {
+struct Location {
     island: usize,
-    place: usize,
+    index: usize,
 }
 
 /// Components of a garment with fewer vertices are grouped: the overhead of an island exceeds what its sleep saves.
@@ -69,7 +69,7 @@ impl<'a> Builder<'a> {
     pub(super) fn new(scene: &'a Scene, time: f64) -> Self {
         let prefix_names = scene.garments.len() + scene.hair.len() > 1;
         let (model, edge, pieces) = (Model::default(), Vec::new(), Vec::new());
-        Self { scene, time, model, edge, prefix_names, pieces, springs: Vec::new(), homes: Vec::new() }
+        Self { scene, time, model, edge, prefix_names, pieces, springs: Vec::new(), locations: Vec::new() }
     }
 
     pub(super) fn model(mut self) -> Result<Model, ModelError> {
@@ -192,7 +192,7 @@ impl<'a> Builder<'a> {
             (1..self.pieces.len()).for_each(|piece| groups.join(0, piece));
         }
         self.model.sewn = seams.concat();
-        self.homes = vec![Home::default(); self.model.x.len()];
+        self.locations = vec![Location::default(); self.model.x.len()];
         for (piece, island) in self.pieces.iter().zip(groups.numbers()) {
             if island == self.model.islands.len() {
                 self.model.islands.push(IslandModel::default());
@@ -200,7 +200,7 @@ impl<'a> Builder<'a> {
             let (members, first) =
                 (&mut self.model.islands[island].vertices, self.model.parts[piece.part].vertices.start);
             for vertex in piece.vertices.iter().map(|vertex| first + vertex) {
-                self.homes[vertex] = Home { island, place: members.len() };
+                self.locations[vertex] = Location { island, index: members.len() };
                 members.push(vertex);
             }
         }
@@ -223,9 +223,9 @@ impl<'a> Builder<'a> {
     /// Returns the island of a piece, the piece's offset within it, and the prefix of its terms' names.
     fn island_of(&self, piece: &Piece) -> (usize, SystemPart) {
         let part = &self.model.parts[piece.part];
-        let Home { island, place } = self.homes[part.vertices.start + piece.vertices[0]];
+        let Location { island, index } = self.locations[part.vertices.start + piece.vertices[0]];
         let prefix = if self.prefix_names { format!("{}: ", part.name) } else { String::new() };
-        (island, SystemPart { first: place, prefix })
+        (island, SystemPart { first: index, prefix })
     }
 
     /// Adds the terms of a fabric on a piece. `since` is the number of labels before its part.
@@ -304,8 +304,8 @@ impl<'a> Builder<'a> {
             // The pairs of a seam may lie on several islands, if a garment of many pieces is sewn to itself.
             let mut pairs: BTreeMap<usize, (Vec<[usize; 2]>, Vec<f64>)> = BTreeMap::new();
             for &[p, q] in joined {
-                let (pairs, gaps) = pairs.entry(self.homes[p].island).or_default();
-                pairs.push([p, q].map(|vertex| self.homes[vertex].place));
+                let (pairs, gaps) = pairs.entry(self.locations[p].island).or_default();
+                pairs.push([p, q].map(|vertex| self.locations[vertex].index));
                 gaps.push(norm(subtract(self.model.x[p], self.model.x[q])));
             }
             let since = self.model.labels.len();
@@ -326,8 +326,8 @@ impl<'a> Builder<'a> {
             let (name, first) = (part.name.clone(), part.vertices.start);
             inflation::check_closed(mesh).map_err(|source| ModelError::Inflation { part: name.clone(), source })?;
             let mut triangles: BTreeMap<usize, Vec<[usize; 3]>> = BTreeMap::new();
-            for corners in mesh.triangles().iter().map(|corners| corners.map(|corner| self.homes[first + corner])) {
-                triangles.entry(corners[0].island).or_default().push(corners.map(|home| home.place));
+            for corners in mesh.triangles().iter().map(|corners| corners.map(|corner| self.locations[first + corner])) {
+                triangles.entry(corners[0].island).or_default().push(corners.map(|location| location.index));
             }
             let centre = mean(&self.model.x[part.vertices.clone()]);
             let (since, label) = (self.model.labels.len(), format!("{name}: pressure"));
@@ -347,7 +347,7 @@ impl<'a> Builder<'a> {
         let since = self.model.labels.len();
         let mut triangles = vec![Vec::new(); self.model.islands.len()];
         for corners in &self.model.triangles {
-            triangles[self.homes[corners[0]].island].push(corners.map(|corner| self.homes[corner].place));
+            triangles[self.locations[corners[0]].island].push(corners.map(|corner| self.locations[corner].index));
         }
         for (island, triangles) in triangles.iter().enumerate().filter(|(_, triangles)| !triangles.is_empty()) {
             self.add_term(island, since, wind.term(triangles));
@@ -481,9 +481,9 @@ impl<'a> Builder<'a> {
         let mut held: BTreeMap<usize, Vec<Held>> = BTreeMap::new();
         for (number, &vertex) in chosen.iter().enumerate() {
             let stiffness = soft.stiffness * soft.weights.get(number).unwrap_or(&1.0);
-            let Home { island, place } = self.homes[vertex];
+            let Location { island, index } = self.locations[vertex];
             let initial = start.inverse_transform(self.model.x[vertex]);
-            held.entry(island).or_default().push(Held { vertex: place, stiffness, initial });
+            held.entry(island).or_default().push(Held { vertex: index, stiffness, initial });
         }
         let since = self.model.labels.len();
         for (island, held) in held {

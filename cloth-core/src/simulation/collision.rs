@@ -345,7 +345,7 @@ mod tests {
         let edges: Vec<&[u32]> = mesh.edges().iter().map(|ends| &ends[..]).collect();
         let counts = format!("{} {} {}\n", mesh.vertices(), triangles.len(), edges.len());
         let text = counts + &lines(&triangles) + &lines(&edges) + &moves;
-        let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/simulation/judge_with_ipctk.py");
+        let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/simulation/check_with_ipctk.py");
         let python = Command::new("python3").arg(script).stdin(Stdio::piped()).stdout(Stdio::piped()).spawn();
         let Ok(mut python) = python.map_err(|error| eprintln!("skipped: no python3 ({error})")) else { return };
         // Without the package the script ends before it reads.

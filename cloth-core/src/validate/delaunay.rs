@@ -47,17 +47,14 @@ pub(super) fn double_area(a: Point, b: Point, c: Point) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use super::super::strip::random_numbers;
     use super::*;
 
     #[test]
     fn no_point_lies_inside_any_circle_and_the_hull_is_covered() {
-        let mut state = 7_u32;
-        let mut random = || {
-            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-            f64::from(state >> 8) / f64::from(1 << 24)
-        };
+        let mut random = random_numbers(7);
         let mut points: Vec<Point> = (0..60).map(|_| [random(), random()]).collect();
-        points.extend([[-0.1, -0.1], [1.1, -0.1], [1.1, 1.1], [-0.1, 1.1]]);
+        points.extend([[-0.6, -0.6], [0.6, -0.6], [0.6, 0.6], [-0.6, 0.6]]);
         let triangles = triangulate(&points);
         let area: f64 = triangles.iter().map(|&[a, b, c]| 0.5 * double_area(points[a], points[b], points[c])).sum();
         assert!((area - 1.44).abs() < 1e-12, "{area}");

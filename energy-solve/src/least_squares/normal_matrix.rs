@@ -269,6 +269,15 @@ mod tests {
     }
 
     #[test]
+    fn a_new_matrix_is_zero() {
+        let pattern = Arc::new(Couplings::pattern(3, [[0, 2].as_slice()]).unwrap());
+        let matrix = NormalMatrix::<2>::zeros(pattern);
+        let (x, mut y) = ([[1.0, -2.0], [3.0, 0.5], [-1.0, 4.0]], [[f64::NAN; 2]; 3]);
+        matrix.multiply_damped(2.0, &x, &mut y);
+        assert_eq!(y, x.map(|point| point.map(|component| 2.0 * component)));
+    }
+
+    #[test]
     fn stencils_that_do_not_fit_are_rejected() {
         let pattern = Couplings::pattern(3, [[0, 1].as_slice()]).unwrap();
         assert!(matches!(Couplings::new(&pattern, &[[0, 0]]), Err(CouplingError::Repeated { element: 0, block: 0 })));

@@ -56,3 +56,24 @@ impl SpinBarrier {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_all_threads_wrote_before_a_barrier_is_visible_after_it() {
+        const THREADS: usize = 3;
+        let (barrier, written) = (SpinBarrier::new(THREADS), AtomicUsize::new(0));
+        let take_turns = || {
+            let _participation = barrier.participate();
+            for round in 1..=200 {
+                written.fetch_add(1, Ordering::Relaxed);
+                barrier.wait();
+                assert_eq!(written.load(Ordering::Relaxed), THREADS * round);
+                barrier.wait();
+            }
+        };
+        std::thread::scope(|scope| (0..THREADS).for_each(|_| drop(scope.spawn(take_turns))));
+    }
+}

@@ -210,4 +210,18 @@ mod tests {
         assert!(!are_feasible(1.5, 0.4, 0.0) && !are_feasible(1.5, 0.0, 0.4));
         assert!(!are_feasible(0.05, 0.0, 0.0));
     }
+
+    #[test]
+    fn a_triangle_that_collapsed_to_a_line_keeps_the_contact_of_its_edge() {
+        let mesh = CollisionMesh::new(5, &[[0, 1, 2], [1, 0, 3]], &[], &[]);
+        let pair = Pair { kind: PairKind::PointTriangle, features: [4, 0], vertices: [4, 0, 1, 2] };
+        let is_feasible = |apex: Vector3<f64>| {
+            // The point is above the middle of the edge, and outside of the first triangle.
+            let x = [[0.0; 3], [1.0, 0.0, 0.0], [0.5, 1.0, 0.0], apex, [0.5, -0.01, 0.1]];
+            FeasibleRegions { mesh: &mesh, x: &x }.contain(&pair, &Closest::of(&pair, &pair.corners(&x)))
+        };
+        assert!(is_feasible([0.5, -1.0, -1.0]), "a ridge");
+        assert!(!is_feasible([0.5, -1.0, 0.0]), "nearer to the other triangle");
+        assert!(is_feasible([0.25, 0.0, 0.0]), "on the line of the edge");
+    }
 }

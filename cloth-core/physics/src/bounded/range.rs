@@ -101,3 +101,35 @@ ranges! {
     AboveOne: (1.0, false), (LARGEST, true); "a number greater than 1", "numbers greater than 1";
         "no thread stretches that far";
 }
+
+#[cfg(test)]
+mod tests {
+    use serde::de::value::Error;
+
+    use super::*;
+
+    /// Panics unless a range contains some numbers, and not others.
+    fn contains<R: Range>(inside: &[f64], outside: &[f64]) {
+        let is_inside = |number: &f64| R::check::<Error>(*number, &[]).is_ok();
+        let [wanted, _] = R::NAMES;
+        inside.iter().for_each(|number| assert!(is_inside(number), "{number:e} is {wanted}"));
+        let beyond = [f64::NAN, f64::INFINITY, f64::NEG_INFINITY];
+        outside.iter().chain(&beyond).for_each(|number| assert!(!is_inside(number), "{number:e} is not {wanted}"));
+    }
+
+    #[test]
+    fn ranges_contain_what_is_physically_possible() {
+        contains::<Positive>(&[1e-300, 1.0, 1e12], &[0.0, -1.0, 2e12]);
+        contains::<NonNegative>(&[0.0, 1e12], &[-1e-300, 2e12]);
+        contains::<Signed>(&[-1e12, 0.0, 1e12], &[-2e12, 2e12]);
+        contains::<Number>(&[-1e9, 0.0, 1e9], &[-2e9, 2e9]);
+        contains::<Speed>(&[-SPEED_OF_LIGHT, 0.0, SPEED_OF_LIGHT], &[-3e8, 3e8]);
+        // Outside, an elastic solid gains energy when it is sheared or compressed.
+        contains::<PoissonRatio>(&[-0.99, 0.0, 0.99], &[-1.0, 1.0]);
+        contains::<Fraction>(&[1e-300, 0.99], &[0.0, 1.0]);
+        // Black and white.
+        contains::<Channel>(&[0.0, 0.5, 1.0], &[-0.01, 1.01]);
+        contains::<Angle>(&[0.1, 170.0], &[0.0, 171.0]);
+        contains::<AboveOne>(&[1.01, 1e12], &[1.0, 2e12]);
+    }
+}

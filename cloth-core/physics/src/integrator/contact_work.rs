@@ -75,3 +75,23 @@ impl std::fmt::Display for ContactWork {
         Ok(())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_work_of_consecutive_times_adds_up() {
+        let counts = |n: u64| {
+            let mut counts = ContactCounts::default();
+            (counts.searches, counts.clear, counts.moves, counts.shortened) = (n, n + 2, 3 * n, 5 * n);
+            (counts.candidates, counts.tested, counts.active, counts.systems) = (7 * n, 11 * n, 13 * n, 17 * n);
+            counts.left = 0.5 * n as f64;
+            counts
+        };
+        let [start, middle, end] = [1, 4, 9].map(counts);
+        let mut sum = ContactWork::between(&start, &middle);
+        sum += ContactWork::between(&middle, &end);
+        assert_eq!(sum, ContactWork::between(&start, &end));
+    }
+}

@@ -104,3 +104,50 @@ impl Tolerances {
 pub(super) fn second_order_tolerances() -> NewtonOptions {
     NewtonOptions { velocity_tolerance: 1e-7, linear_tolerance: 1e-3, ..NewtonOptions::default() }
 }
+
+#[cfg(test)]
+mod tests {
+    use energy_elements::{HookeSpring, ViscousDrag};
+    use energy_solve::{ElementList, ForceTerm, PotentialTerm, System};
+
+    use super::*;
+    use crate::body::Body;
+
+    /// Returns the error of a damped oscillation after 1 s: a mass m between a spring k and a damper c. With γ = c/2m
+    /// and ω² = k/m − γ², x = e^(−γt) (x₀ cos ωt + (v₀ + γ x₀)/ω sin ωt).
+    fn error_after_one_second(scheme: Scheme, steps: u32) -> f64 {
+        let (m, k, c, x, v) = (2.0, 18.0, 0.8, [1.0, -0.5, 0.2], [0.3, 2.0, -1.0]);
+        let spring = ElementList::new("spring", vec![HookeSpring::new(k, 0.0)], &[[0, 1]]).unwrap();
+        let drag = ElementList::new("drag", vec![ViscousDrag::new(c)], &[[1]]).unwrap();
+        let terms: Vec<Box<dyn energy_solve::Term>> =
+            vec![Box::new(PotentialTerm::new(spring)), Box::new(ForceTerm::new(drag))];
+        let system = System::new(terms, &[true, false]).unwrap();
+        let mut body = Body { x: vec![[0.0; 3], x], v: vec![[0.0; 3], v], masses: vec![1.0, m], system };
+        let mut integrator = scheme.integrator();
+        for _ in 0..steps {
+            integrator.step(&mut body, 1.0 / f64::from(steps)).unwrap();
+        }
+        let gamma: f64 = 0.5 * c / m;
+        let omega = (k / m - gamma * gamma).sqrt();
+        let (sine, cosine) = omega.sin_cos();
+        let errors = (0..3).map(|axis| {
+            let exact = (-gamma).exp() * (x[axis] * cosine + (v[axis] + gamma * x[axis]) / omega * sine);
+            (body.x[1][axis] - exact).abs()
+        });
+        errors.fold(0.0, f64::max)
+    }
+
+    #[test]
+    fn schemes_converge_to_the_damped_oscillation_in_their_order() {
+        for scheme in Scheme::ALL {
+            let order = match scheme {
+                Scheme::ImplicitEuler | Scheme::Newton | Scheme::SymplecticEuler | Scheme::ExplicitEuler => 1,
+                Scheme::Bdf2 | Scheme::ImplicitMidpoint | Scheme::Trapezoid | Scheme::Verlet => 2,
+                Scheme::ExplicitEulerAsPrinted => continue, // lacks a factor h
+            };
+            let [coarse, fine] = [100, 200].map(|steps| error_after_one_second(scheme, steps));
+            let found = (coarse / fine).log2();
+            assert!((found - f64::from(order)).abs() < 0.1 && fine < 0.05, "{scheme:?}: {found}, {fine:e} m");
+        }
+    }
+}

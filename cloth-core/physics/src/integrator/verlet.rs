@@ -9,8 +9,7 @@ use crate::body::Body;
 ///
 /// v½ = v + ½ h M⁻¹ f(x, v),  x' = x + h v½,  v' = v½ + ½ h M⁻¹ f(x', v + h M⁻¹ f(x, v)). Second order, stable for
 /// small steps only. Without damping it is symplectic, conserves momentum and angular momentum, and evaluates the
-/// forces once per step, because the forces at the end are those at the start of the next step. evaluation of the
-/// forces a step: the last is kept.
+/// forces once per step, because the forces at the end are those at the start of the next step.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Verlet {
     last: Option<Forces>,

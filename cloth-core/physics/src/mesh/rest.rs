@@ -104,4 +104,19 @@ mod tests {
         assert_eq!(masses, [1.0, 0.5, 1.0, 0.5]);
         assert_eq!(masses.iter().sum::<f64>(), 0.5 * 6.0);
     }
+
+    #[test]
+    fn a_triangle_keeps_its_lengths_when_it_is_laid_into_its_plane() {
+        let corners = [[0.3, -1.0, 0.5], [1.9, 0.4, 2.0], [-0.8, 0.7, 1.1]];
+        let planes = [material_triangle(corners), thread_triangle(corners, [0.2, 1.0, -0.4]).unwrap()];
+        for laid in planes {
+            for [a, b] in [[0, 1], [1, 2], [2, 0]] {
+                let length = norm(subtract(corners[b], corners[a]));
+                let apart = (laid[b][0] - laid[a][0]).hypot(laid[b][1] - laid[a][1]);
+                assert!((apart - length).abs() < 1e-14, "{apart} for {length}");
+            }
+            let [p, q] = [1, 2].map(|corner| laid[corner]);
+            assert!((0.5 * (p[0] * q[1] - p[1] * q[0]) - area(corners)).abs() < 1e-14, "anticlockwise");
+        }
+    }
 }

@@ -227,6 +227,12 @@ mod tests {
     }
 
     #[test]
+    fn a_triangle_is_thicker_than_the_rounding_of_its_corners() {
+        let sliver = |height: f64| has_area([[0.0; 3], [1.0, 0.0, 0.0], [0.5, height, 0.0]]);
+        assert!(sliver(1e-13) && !sliver(20.0 * f64::EPSILON) && !sliver(f64::NAN));
+    }
+
+    #[test]
     fn tiny_but_well_shaped_triangles_are_accepted() {
         let vertices = square().into_iter().map(|p| p.map(|c| c * 1e-9)).collect();
         assert!(TriangleMesh::new(vertices, vec![[0, 1, 2], [0, 2, 3]]).is_ok());

@@ -63,9 +63,9 @@ pub(crate) fn distribute<T: Precision>(
     inverses: &[InverseFactor<T>],
     threads: usize,
 ) -> Vec<DomainContacts<T>> {
-    let (mut all, homes) = published(contacts, ranges);
+    let (mut all, locations) = published(contacts, ranges);
     let parts = contacts.chunks(PART).collect();
-    for part in for_each(threads, parts, |part| scaled_factors(part, ranges.len(), &homes, inverses)) {
+    for part in for_each(threads, parts, |part| scaled_factors(part, ranges.len(), &locations, inverses)) {
         for (domain, factors) in all.iter_mut().zip(part) {
             domain.factors.push(factors);
         }
@@ -77,7 +77,7 @@ pub(crate) fn distribute<T: Precision>(
 fn scaled_factors<T: Precision>(
     contacts: &[Contact],
     domains: usize,
-    homes: &[Home],
+    locations: &[Location],
     inverses: &[InverseFactor<T>],
 ) -> Vec<Vec<ScaledFactor<T>>> {
     let mut all: Vec<_> = (0..domains).map(|_| Vec::new()).collect();
@@ -85,7 +85,7 @@ fn scaled_factors<T: Precision>(
         let mut vertices = [Vertex::default(); 4];
         let mut count = 0;
         for (row, weight) in contact.free() {
-            vertices[count] = Vertex { row, weight, home: homes[row] };
+            vertices[count] = Vertex { row, weight, location: locations[row] };
             count += 1;
         }
         let vertices = &vertices[..count];
@@ -93,20 +93,21 @@ fn scaled_factors<T: Precision>(
         for root in factors(contact) {
             let mut scaled_factor = ScaledFactor {
                 vectors: [[T::from_f64(0.0); 4]; 4],
-                sources: [[first.home.domain, first.home.published]; 4],
+                sources: [[first.location.domain, first.location.published]; 4],
                 targets: [ELSEWHERE; 4],
             };
-            for (number, &Vertex { row, weight, home }) in vertices.iter().enumerate() {
+            for (number, &Vertex { row, weight, location }) in vertices.iter().enumerate() {
                 let root: Vector3<f64> = root.map(|component| weight * component);
                 let [u, v, w] = scaled(&inverses[row], &root).map(T::from_f64);
                 scaled_factor.vectors[number] = [u, v, w, T::from_f64(0.0)];
-                scaled_factor.sources[number] = [home.domain, home.published];
+                scaled_factor.sources[number] = [location.domain, location.published];
             }
-            for (number, Vertex { home: Home { domain, .. }, .. }) in vertices.iter().enumerate() {
-                let is_first = vertices[..number].iter().all(|before| before.home.domain != *domain);
+            for (number, Vertex { location: Location { domain, .. }, .. }) in vertices.iter().enumerate() {
+                let is_first = vertices[..number].iter().all(|before| before.location.domain != *domain);
                 if is_first {
-                    let target =
-                        |vertex: &Vertex| if vertex.home.domain == *domain { vertex.home.row } else { ELSEWHERE };
+                    let target = |vertex: &Vertex| {
+                        if vertex.location.domain == *domain { vertex.location.row } else { ELSEWHERE }
+                    };
                     vertices.iter().zip(&mut scaled_factor.targets).for_each(|(vertex, t)| *t = target(vertex));
                     all[*domain as usize].push(scaled_factor.clone());
                 }
@@ -121,12 +122,12 @@ fn scaled_factors<T: Precision>(
 struct Vertex {
     row: usize,
     weight: f64,
-    home: Home,
+    location: Location,
 }
 
 /// The location of a row.
 #[derive(Clone, Copy, Default)]
-struct Home {
+struct Location {
     domain: u32,
     /// Its number within the domain.
     row: u32,
@@ -134,22 +135,22 @@ struct Home {
     published: u32,
 }
 
-/// Returns the rows of each domain that contacts act on, and the home of each such row.
-fn published<T>(contacts: &[Contact], ranges: &[Range<usize>]) -> (Vec<DomainContacts<T>>, Vec<Home>) {
+/// Returns the rows of each domain that contacts act on, and the location of each such row.
+fn published<T>(contacts: &[Contact], ranges: &[Range<usize>]) -> (Vec<DomainContacts<T>>, Vec<Location>) {
     let mut is_touched = vec![false; ranges.last().map_or(0, |range| range.end)];
     contacts.iter().flat_map(Contact::free).for_each(|(row, _)| is_touched[row] = true);
-    let mut homes = vec![Home::default(); is_touched.len()];
+    let mut locations = vec![Location::default(); is_touched.len()];
     let mut all = Vec::new();
     for (domain, range) in ranges.iter().enumerate() {
         let mut rows = Vec::new();
         for row in range.clone().filter(|&row| is_touched[row]) {
             let own = index(row - range.start);
-            homes[row] = Home { domain: index(domain), row: own, published: index(rows.len()) };
+            locations[row] = Location { domain: index(domain), row: own, published: index(rows.len()) };
             rows.push(own);
         }
         all.push(DomainContacts { rows, factors: Vec::new() });
     }
-    (all, homes)
+    (all, locations)
 }
 
 impl<T: Precision> DomainContacts<T> {

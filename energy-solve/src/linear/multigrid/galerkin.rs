@@ -224,10 +224,9 @@ mod tests {
     fn the_galerkin_product_is_the_dense_product() {
         let pattern = Arc::new(grid(11));
         let mut fine = BlockMatrix::zeros(Arc::clone(&pattern));
-        let mut seed = 1_u64;
+        let mut random = fastrand::Rng::with_seed(1);
         for entry in fine.values_mut().iter_mut().flatten().flatten() {
-            seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            *entry = (seed >> 11) as f64 / (1_u64 << 53) as f64 - 0.5;
+            *entry = random.f64() - 0.5;
         }
         for row in 0..pattern.rows() {
             let block = *fine.diagonal(row);

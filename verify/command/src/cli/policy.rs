@@ -24,7 +24,7 @@ pub fn show(lines: &[PolicyLine]) -> anyhow::Result<()> {
         };
         table.add_row([&line.record, &line.potential, &line.block, &line.status, &line.found, verdict]);
     }
-    let judged = lines.iter().filter(|line| line.passed.is_some()).count();
+    let checked = lines.iter().filter(|line| line.passed.is_some()).count();
     let passed = lines.iter().filter(|line| line.passed == Some(true)).count();
-    print(&format!("\n{table}\n\n{passed} of {judged} blocks at degenerate inputs as documented\n"))
+    print(&format!("\n{table}\n\n{passed} of {checked} blocks at degenerate inputs as documented\n"))
 }

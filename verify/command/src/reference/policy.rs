@@ -82,7 +82,7 @@ pub fn policy(path: &Path) -> Result<Vec<PolicyLine>, RecordError> {
                     let name = BlockName::of_kind(kind).iter().copied().find(|n| n.name() == block);
                     let name = name.ok_or_else(|| fail(format!("unknown block `{block}`")))?;
                     let (mut passed, found) =
-                        judge(rule, answer, name, answer.flags[name.order(kind)].any()).map_err(fail)?;
+                        check(rule, answer, name, answer.flags[name.order(kind)].any()).map_err(fail)?;
                     passed &= again.as_ref().is_ok_and(|again| same_bits(again.block(name), answer.block(name)));
                     if rule.status == "regular" {
                         let formula = Textbook::from_source(&declaration.source);
@@ -107,7 +107,7 @@ pub fn policy(path: &Path) -> Result<Vec<PolicyLine>, RecordError> {
     Ok(lines)
 }
 
-fn judge(rule: &Rule, answer: &Answer, name: BlockName, flagged: bool) -> Result<(bool, String), String> {
+fn check(rule: &Rule, answer: &Answer, name: BlockName, flagged: bool) -> Result<(bool, String), String> {
     let numbers = &answer.block(name).numbers;
     let finite = numbers.iter().all(|x| x.is_finite());
     let passed = match rule.status.as_str() {

@@ -142,6 +142,15 @@ mod tests {
     use super::*;
 
     #[test]
+    fn an_isotropic_plate_has_the_rigidity_of_kirchhoff() {
+        // Y h³/12(1 − ν²): a sheet of steel of 2 mm.
+        let d = Rigidity::Isotropic { young_modulus: 200e9, thickness: 2e-3, poisson_ratio: 0.25 }.matrix().unwrap();
+        let expected = 200e9 * 8e-9 / (12.0 * (1.0 - 0.0625));
+        let close = |number: f64, factor: f64| (number / expected - factor).abs() < 1e-14;
+        assert!(close(d[0][0], 1.0) && close(d[1][1], 1.0) && close(d[0][1], 0.25) && close(d[2][2], 0.375), "{d:?}");
+    }
+
+    #[test]
     fn strips_of_woven_cloth_have_the_measured_rigidities() {
         let woven = Rigidity::Orthotropic { warp: 3.0, weft: 1.0, bias: 1.2, poisson_ratio: 0.2 };
         let d = woven.matrix().unwrap();
