@@ -18,6 +18,7 @@ mod linear_solvers;
 mod local_elimination;
 mod mesh_obstacle;
 mod motion;
+mod moving_obstacles;
 mod obstacles;
 mod other_programs;
 mod plate;
