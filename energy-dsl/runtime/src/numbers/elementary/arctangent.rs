@@ -1,4 +1,4 @@
-use super::{Binary, Bits, fast_sum, polynomial, power_of_two};
+use super::{Binary, Bits, fast_sum, horner, polynomial, power_of_two};
 use crate::numbers::cpu::Scalar;
 use crate::numbers::level::Level;
 
@@ -62,7 +62,7 @@ impl ArcTangent for f32 {
     #[inline(always)]
     fn arc_tangent_rest<D: Bits<Format = Self>, L: Level>(z: D) -> D {
         let coefficients = [-0.333_333_16, 0.199_985_28, -0.142_443_91, 0.105_991_684, -0.060_900_52];
-        polynomial::<D, L, 5>(z, coefficients)
+        horner::<D, L, _>(z, coefficients)
     }
 }
 

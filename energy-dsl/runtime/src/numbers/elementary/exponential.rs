@@ -1,4 +1,4 @@
-use super::{Bits, Format, Unary, fast_sum, polynomial};
+use super::{Bits, Format, Unary, fast_sum, horner, polynomial};
 use crate::numbers::cpu::Scalar;
 use crate::numbers::level::Level;
 
@@ -54,7 +54,7 @@ impl Exponential for f32 {
     #[inline(always)]
     fn exponential_rest<D: Bits<Format = Self>, L: Level>(r: D) -> D {
         let coefficients = [0.5, 0.166_666_48, 0.041_666_48, 0.008_337_869, 0.001_393_338_1, 0.000_173_401_33];
-        polynomial::<D, L, 6>(r, coefficients)
+        horner::<D, L, _>(r, coefficients)
     }
 }
 

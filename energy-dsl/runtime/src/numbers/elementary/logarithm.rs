@@ -1,5 +1,5 @@
 use super::exponential::Exponential;
-use super::{Bits, Format, Unary, fast_sum, polynomial};
+use super::{Bits, Format, Unary, fast_sum, horner, polynomial};
 use crate::numbers::cpu::Scalar;
 use crate::numbers::level::Level;
 
@@ -55,7 +55,7 @@ impl Logarithm for f32 {
     /// Relative error of the logarithm below 2^−30.2.
     #[inline(always)]
     fn logarithm_rest<D: Bits<Format = Self>, L: Level>(z: D) -> D {
-        polynomial::<D, L, 3>(z, [0.666_667_76, 0.399_775_86, 0.298_706_95])
+        horner::<D, L, _>(z, [0.666_667_76, 0.399_775_86, 0.298_706_95])
     }
     /// Adds the rounding errors of f²/2 and of f − f²/2, which would be an eighth of the error each.
     #[inline(always)]

@@ -1,6 +1,6 @@
 use super::exponential::{Exponential, exp_of_sum};
 use super::logarithm::decompose;
-use super::{Binary, Bits, Format, fast_sum, polynomial, power_of_two};
+use super::{Binary, Bits, Format, fast_sum, horner, polynomial, power_of_two};
 use crate::numbers::cpu::Scalar;
 use crate::numbers::level::Level;
 
@@ -45,7 +45,7 @@ impl Power for f32 {
     /// Its contribution to the logarithm is accurate to 2^−43 of the logarithm.
     #[inline(always)]
     fn artanh_rest<D: Bits<Format = Self>, L: Level>(z: D) -> D {
-        polynomial::<D, L, 3>(z, [0.142_857_98, 0.110_991_35, 0.096_325_72])
+        horner::<D, L, _>(z, [0.142_857_98, 0.110_991_35, 0.096_325_72])
     }
 }
 

@@ -1,4 +1,4 @@
-use super::{Bits, Format, Unary, fast_sum, huge_angle, polynomial};
+use super::{Bits, Format, Unary, fast_sum, horner, huge_angle, polynomial};
 use crate::numbers::cpu::Scalar;
 use crate::numbers::level::Level;
 use crate::numbers::real::Mask;
@@ -100,12 +100,12 @@ impl Trigonometry for f32 {
     /// Relative error of the sine below 2^−32.4.
     #[inline(always)]
     fn sine_rest<D: Bits<Format = Self>, L: Level>(z: D) -> D {
-        polynomial::<D, L, 4>(z, [-0.166_666_67, 0.008_333_379, -0.000_198_530_4, 2.832_010_7e-6])
+        horner::<D, L, _>(z, [-0.166_666_67, 0.008_333_379, -0.000_198_530_4, 2.832_010_7e-6])
     }
     /// Relative error of the cosine below 2^−32.9.
     #[inline(always)]
     fn cosine_rest<D: Bits<Format = Self>, L: Level>(z: D) -> D {
-        polynomial::<D, L, 3>(z, [0.041_666_646, -0.001_388_730_6, 0.000_024_431_65])
+        horner::<D, L, _>(z, [0.041_666_646, -0.001_388_730_6, 0.000_024_431_65])
     }
 }
 
