@@ -5,8 +5,8 @@ use crate::numbers::level::Level;
 /// The angle of the point (x, y); y is the first argument.
 pub struct Atan2;
 
-/// The angle of a point whose distance from the origin is between 2^−320 and 2^320, in single precision between 2^−48 and
-/// 2^48. Same bits as [`Atan2`], without the special cases.
+/// The angle of a point whose distance from the origin is between 2^−320 and 2^320 (2^−48 and 2^48 in single
+/// precision). Same bits as [`Atan2`], without the special cases.
 pub struct ModerateAtan2;
 
 /// The constants of the arc tangent in one precision.
@@ -15,8 +15,8 @@ pub trait ArcTangent: Scalar {
     const QUARTER_PI: (Self, Self);
     /// tan π/8.
     const TAN_8TH_PI: Self;
-    /// Points whose larger coordinate is below, between and above [`Self::SCALE_BOUNDS`] are multiplied by these powers of
-    /// two. Then no intermediate result overflows, and a quotient underflows only if it is subnormal.
+    /// Points whose larger coordinate is below, between and above [`Self::SCALE_BOUNDS`] are multiplied by these powers
+    /// of two. Then no intermediate result overflows, and a quotient underflows only if it is subnormal.
     const SCALES: [i32; 3];
     /// Exponents of the bounds that [`Self::SCALES`] refers to. The middle covers [`ModerateAtan2`].
     const SCALE_BOUNDS: [i32; 2];

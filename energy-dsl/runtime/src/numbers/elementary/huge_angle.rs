@@ -100,8 +100,8 @@ pub fn reduce_double(angle: f64) -> [f64; 3] {
     [f64::ROUND + f64::from(quadrant), sign * high, sign * low]
 }
 
-/// Returns the product of two numbers in two parts each. Split without fused operations, so that it is the same at every
-/// level.
+/// Returns the product of two numbers in two parts each. Split without fused operations, so that it is the same at
+/// every level.
 fn times<S: Format>(high: S, low: S, factor: (S, S)) -> (S, S) {
     let product = high * factor.0;
     let error = high.product_error::<Baseline>(factor.0) + (high * factor.1 + low * factor.0);

@@ -10,8 +10,8 @@ pub struct Ln;
 pub trait Logarithm: Scalar {
     /// √½, rounded.
     const ROOT_HALF: Self;
-    /// Adding its bits to those of a number increments the exponent from √2 on instead of from 2 on: the bits of 1 minus
-    /// those of √½.
+    /// The bits of 1 minus those of √½. After they were added to the bits of a number, the exponent increments at √2
+    /// instead of at 2.
     const ONE_LESS_ROOT_HALF: Self;
     /// A power of two that makes subnormal numbers normal, and its exponent.
     const LIFT: (Self, Self);

@@ -5,9 +5,9 @@
 //! Nothing in single precision is computed in double precision, so the same code suits processors without doubles.
 //!
 //! All are within 1 ulp over the whole range, including subnormal numbers and the special cases of IEEE 754; `verify`
-//! tests this. In single precision, with u = 2⁻²⁴ = ½ ulp(1), the error of exponentials and powers is at most 1.01 u, of
-//! logarithms 1.05 u, of angles 1.1 u, of sine and cosine 1.2 u; the nearest number has an error of up to 1 u. Results below
-//! 2⁻¹¹⁸ have errors of up to ¾ ulp, because most are rounded twice.
+//! tests this. Errors in single precision are smaller: exponentials and powers are within 1.01 u, logarithms 1.05 u,
+//! angles 1.1 u, sine and cosine 1.2 u, with u = 2⁻²⁴ = ½ ulp(1). The nearest number has an error of up to 1 u. Results
+//! below 2⁻¹¹⁸ are within ¾ ulp; most are rounded twice.
 //!
 //! The polynomials minimise the maximum relative error of the function. They were computed in multi-precision by the
 //! Remez exchange algorithm. Doubles are its rounded coefficients. In single precision, each coefficient was rounded
@@ -153,8 +153,8 @@ fn power_of_two<D: Bits>(exponent: i32) -> D {
     D::splat(D::Format::power_of_two(exponent))
 }
 
-/// Returns Σ `coefficients[i]` zⁱ for a few coefficients, by Horner's scheme: it has fewer operations than Estrin's, and
-/// rounds only once at the size of the first coefficient.
+/// Returns Σ `coefficients[i]` zⁱ for a few coefficients, by Horner's scheme: it has fewer operations than Estrin's,
+/// and rounds only once at the size of the first coefficient.
 #[inline(always)]
 fn horner<D: Bits, L: Level, const N: usize>(z: D, coefficients: [D::Format; N]) -> D {
     let mut sum = D::splat(coefficients[N - 1]);

@@ -99,7 +99,7 @@ struct Found(f64, (f32, f32), f32);
 /// Arguments that are tested together.
 const CHUNK: usize = 1 << 12;
 
-/// Checks the largest errors of ordinary and of small results.
+/// Checks the largest errors of ordinary and of small results. Nearest numbers are passed over.
 fn check<F: Function>(levels: &[LevelName], mut arguments: impl Iterator<Item = (f32, f32)>) {
     let mut worst = vec![[Found(0.0, (0.0, 0.0), 0.0); 2]; levels.len()];
     let (mut expected, mut found) = ([0.0_f64; CHUNK], [0.0_f32; CHUNK]);
@@ -111,6 +111,9 @@ fn check<F: Function>(levels: &[LevelName], mut arguments: impl Iterator<Item = 
             let results = Results::<F, f32>(&chunk, found, PhantomData);
             dispatch_at(level, results).expect("the level is available");
             for ((&at, &expected), &found) in chunk.iter().zip(&*expected).zip(&*found) {
+                if found.to_bits() == (expected as f32).to_bits() {
+                    continue;
+                }
                 let error = error(found, expected);
                 let worst = &mut worst[usize::from(expected.abs() < SMALL)];
                 if error > worst.0 {

@@ -233,8 +233,8 @@ pub fn gather_8(points: &[[f64; 3]], indices: &[u32]) -> [__m512d; 3] {
 #[inline(always)]
 pub fn gather_8_single(points: &[[f32; 3]], indices: &[u32]) -> [__m256; 3] {
     let (indices, last) = (&indices[..8], last_index(points.len()));
-    // SAFETY: registers exist where the features were detected. The points are inner ones where that is checked, and the
-    // slice has eight indices. The plain loads of inner points are faster than masked ones.
+    // SAFETY: registers exist where the features were detected, and the slice has eight indices. It is checked which
+    // points are inner ones; for these, plain loads are faster than masked ones.
     unsafe {
         let numbers = _mm256_loadu_si256(indices.as_ptr().cast());
         let smaller = _mm256_min_epu32(numbers, _mm256_set1_epi32(last.wrapping_sub(1).cast_signed()));
