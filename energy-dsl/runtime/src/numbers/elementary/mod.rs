@@ -7,7 +7,7 @@
 //! All are within 1 ulp over the whole range, including subnormal numbers and the special cases of IEEE 754; `verify`
 //! tests this. Errors in single precision are smaller: exponentials are within 1.01 u, powers 1.05 u, logarithms
 //! 1.15 u, angles 1.1 u, sine and cosine 1.2 u, with u = 2⁻²⁴ = ½ ulp(1). The nearest number has an error of up to
-//! 1 u. Results below 2⁻¹¹⁸ are within ¾ ulp; most are rounded twice.
+//! 1 u. Results below 2⁻¹¹⁸ are within 0.8 ulp; most are rounded twice.
 //!
 //! The polynomials minimise the maximum relative error of the function. They were computed in multi-precision by the
 //! Remez exchange algorithm. Doubles are its rounded coefficients. In single precision, each coefficient was rounded

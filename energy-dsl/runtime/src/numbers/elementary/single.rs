@@ -56,7 +56,7 @@ const SMALL: f64 = 256.0 * f32::MIN_POSITIVE as f64;
 
 /// Largest error of small results, in units of u or of half the least subnormal number. Most subnormal results are
 /// rounded twice.
-const SMALL_BOUND: f64 = 1.55;
+const SMALL_BOUND: f64 = 1.6;
 
 /// Returns the error of a result in units of u, or of half the least subnormal number if that is more.
 fn error(found: f32, expected: f64) -> f64 {
