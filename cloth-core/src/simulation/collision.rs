@@ -152,7 +152,9 @@ mod tests {
     use std::sync::{Arc, Mutex};
 
     use energy_dsl::Vector3;
-    use energy_solve::{Contact, ContactCounts, ContactForces, ContactModel, ContactStep, DofMap, Resistance, SlidingStiffness};
+    use energy_solve::{
+        Contact, ContactCounts, ContactForces, ContactModel, ContactStep, DofMap, Resistance, SlidingStiffness,
+    };
 
     use super::*;
     use crate::Simulation;

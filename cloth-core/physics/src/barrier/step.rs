@@ -2,9 +2,7 @@
 
 use energy_dsl::Vector3;
 use energy_solve::threads::collect;
-use energy_solve::{
-    Contact, ContactCounts, ContactForces, ContactStep, DofMap, Pressed, Resistance, SlidingStiffness,
-};
+use energy_solve::{Contact, ContactCounts, ContactForces, ContactStep, DofMap, Pressed, Resistance, SlidingStiffness};
 
 use super::active_set::ActivePart;
 use super::feasible::FeasibleRegions;

@@ -1,8 +1,8 @@
 use std::collections::BTreeMap;
 
 use super::forward::Sparse;
-use super::weights::Sum;
 use super::linear::{self, Front};
+use super::weights::Sum;
 use crate::graph::{Graph, Input, NodeId};
 
 /// The inputs that derivatives are taken with respect to.

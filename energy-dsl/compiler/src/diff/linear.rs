@@ -4,8 +4,8 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::coordinates::Moving;
-use super::weights::{Span, Sum, Weight};
 use super::local::Order;
+use super::weights::{Span, Sum, Weight};
 use super::{differentiable, moving_operands};
 use crate::graph::{Graph, Input, NodeId, Op};
 

@@ -206,7 +206,7 @@ pub trait Real: Number<Unbounded: Copy> + Copy {}
 impl<T: Number<Unbounded: Copy> + Copy> Real for T {}
 
 macro_rules! number_for_float {
-    ($float:ident, $bits:ident, $mantissa_bits:literal, $exponent_mask:literal, $bias:literal, $binary:ident) => {
+    ($float:ident, $bits:ident, $mantissa_bits:literal, $exponent_mask:literal, $bias:literal) => {
         impl Number for $float {
             type Mask = bool;
             type Unbounded = Unbounded<$float>;
@@ -241,36 +241,35 @@ macro_rules! number_for_float {
             }
             #[inline(always)]
             fn sin<L: Level>(self) -> Self {
-                <Sin as Unary>::of::<f64, L>(f64::from(self)) as $float
+                Sin::of::<Self, L>(self)
             }
             #[inline(always)]
             fn cos<L: Level>(self) -> Self {
-                <Cos as Unary>::of::<f64, L>(f64::from(self)) as $float
+                Cos::of::<Self, L>(self)
             }
             #[inline(always)]
             fn sin_cos<L: Level>(self) -> (Self, Self) {
-                let (sine, cosine) = sin_cos::<f64, L>(f64::from(self));
-                (sine as $float, cosine as $float)
+                sin_cos::<Self, L>(self)
             }
             #[inline(always)]
             fn exp<L: Level>(self) -> Self {
-                <Exp as Unary>::of::<f64, L>(f64::from(self)) as $float
+                Exp::of::<Self, L>(self)
             }
             #[inline(always)]
             fn ln<L: Level>(self) -> Self {
-                <Ln as Unary>::of::<f64, L>(f64::from(self)) as $float
+                Ln::of::<Self, L>(self)
             }
             #[inline(always)]
             fn atan2<L: Level>(self, x: Self) -> Self {
-                Atan2::$binary::<f64, L>(f64::from(self), f64::from(x)) as $float
+                Atan2::of::<Self, L>(self, x)
             }
             #[inline(always)]
             fn moderate_atan2<L: Level>(self, x: Self) -> Self {
-                ModerateAtan2::$binary::<f64, L>(f64::from(self), f64::from(x)) as $float
+                ModerateAtan2::of::<Self, L>(self, x)
             }
             #[inline(always)]
             fn powf<L: Level>(self, exponent: Self) -> Self {
-                Pow::$binary::<f64, L>(f64::from(self), f64::from(exponent)) as $float
+                Pow::of::<Self, L>(self, exponent)
             }
             #[inline(always)]
             fn mul_add<L: Level>(self, factor: Self, addend: Self) -> Self {
@@ -358,8 +357,8 @@ macro_rules! number_for_float {
     };
 }
 
-number_for_float!(f64, u64, 52, 0x7ff, 1023, of);
-number_for_float!(f32, u32, 23, 0xff, 127, of_single);
+number_for_float!(f64, u64, 52, 0x7ff, 1023);
+number_for_float!(f32, u32, 23, 0xff, 127);
 
 #[cfg(test)]
 mod tests {

@@ -38,6 +38,8 @@ pub(super) struct Iterate<'a> {
     pub(super) pins: f64,
     /// Moves of pins that contact had stopped.
     pub(super) pin_moves: usize,
+    /// Whether the next iteration lets pins wait.
+    pub(super) pins_wait: bool,
     /// `false` once a term turned out not to be restrictable.
     may_eliminate: bool,
     /// Iterations that still take the secant stiffness of friction.
@@ -121,6 +123,7 @@ impl<'a> Iterate<'a> {
             converged: false,
             pins,
             pin_moves: 0,
+            pins_wait: false,
             may_eliminate: true,
             secants: 0,
         })
@@ -137,7 +140,8 @@ impl<'a> Iterate<'a> {
             if self.is_balanced()? {
                 break;
             }
-            if self.pins < 1.0 && self.follow_pins()? {
+            let waits = std::mem::take(&mut self.pins_wait);
+            if self.pins < 1.0 && !waits && self.follow_pins()? {
                 continue;
             }
             let direction = self.direction()?;
@@ -146,7 +150,9 @@ impl<'a> Iterate<'a> {
                 Some(step) => {
                     let scale = step.scale;
                     self.accept(step, &direction);
-                    self.move_pins()?;
+                    if !waits {
+                        self.move_pins()?;
+                    }
                     if let Some(few) = few {
                         self.eliminate(&few, scale)?;
                     }

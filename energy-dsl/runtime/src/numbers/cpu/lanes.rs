@@ -3,8 +3,8 @@
 use std::fmt::{self, Debug};
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
-use super::register::{DoubleRegister, Register, Scalar};
-use crate::numbers::elementary::{Atan2, Cos, Double, Exp, Ln, ModerateAtan2, Pow, Sin};
+use super::register::{Register, Scalar};
+use crate::numbers::elementary::{Atan2, Binary, Bits, Cos, Exp, Ln, ModerateAtan2, Pow, Sin, Unary, sin_cos};
 use crate::numbers::lane::Lane;
 use crate::numbers::level::{Kernel, Level};
 use crate::numbers::real::Number;
@@ -123,36 +123,35 @@ impl<R: Register> Number for Lanes<R> {
     }
     #[inline(always)]
     fn sin<L: Level>(self) -> Self {
-        Self(R::unary::<Sin, L>(self.0))
+        Sin::of::<Self, L>(self)
     }
     #[inline(always)]
     fn cos<L: Level>(self) -> Self {
-        Self(R::unary::<Cos, L>(self.0))
+        Cos::of::<Self, L>(self)
     }
     #[inline(always)]
     fn sin_cos<L: Level>(self) -> (Self, Self) {
-        let (sine, cosine) = R::sin_cos::<L>(self.0);
-        (Self(sine), Self(cosine))
+        sin_cos::<Self, L>(self)
     }
     #[inline(always)]
     fn exp<L: Level>(self) -> Self {
-        Self(R::unary::<Exp, L>(self.0))
+        Exp::of::<Self, L>(self)
     }
     #[inline(always)]
     fn ln<L: Level>(self) -> Self {
-        Self(R::unary::<Ln, L>(self.0))
+        Ln::of::<Self, L>(self)
     }
     #[inline(always)]
     fn atan2<L: Level>(self, x: Self) -> Self {
-        Self(R::binary::<Atan2, L>(self.0, x.0))
+        Atan2::of::<Self, L>(self, x)
     }
     #[inline(always)]
     fn moderate_atan2<L: Level>(self, x: Self) -> Self {
-        Self(R::binary::<ModerateAtan2, L>(self.0, x.0))
+        ModerateAtan2::of::<Self, L>(self, x)
     }
     #[inline(always)]
     fn powf<L: Level>(self, exponent: Self) -> Self {
-        Self(R::binary::<Pow, L>(self.0, exponent.0))
+        Pow::of::<Self, L>(self, exponent)
     }
     #[inline(always)]
     fn mul_add<L: Level>(self, factor: Self, addend: Self) -> Self {
@@ -240,7 +239,9 @@ impl<R: Register> Number for Lanes<R> {
     }
 }
 
-impl<R: DoubleRegister> Double for Lanes<R> {
+impl<R: Register> Bits for Lanes<R> {
+    type Format = R::Scalar;
+
     #[inline(always)]
     fn and(self, other: Self) -> Self {
         Self(R::and(self.0, other.0))

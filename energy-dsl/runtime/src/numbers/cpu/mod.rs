@@ -229,7 +229,7 @@ mod tests {
     use crate::numbers::{BlockSum, Float, Lane, Mask, Number};
 
     /// Checks what moves numbers between lanes and slices, for one type of lanes.
-    fn check<S: Number + Copy + PartialEq + std::fmt::Debug, V: Lane<S>>() {
+    fn check<S: Number + Copy + PartialEq + std::fmt::Debug + std::panic::RefUnwindSafe, V: Lane<S>>() {
         let number = |number: usize| S::from_f64(number as f64);
         let lanes = V::LANES;
         for rows in 1..20 {
@@ -244,10 +244,19 @@ mod tests {
                 }
             }
         }
-        let points: Vec<[S; 3]> = (0..40).map(|at| [0, 1, 2].map(|axis| number(10 * at + axis))).collect();
-        let indices: Vec<u32> = (0..lanes as u32).map(|lane| (7 * lane + 3) % 40).collect();
-        for (axis, gathered) in V::gather(&points, &indices).into_iter().enumerate() {
-            assert!((0..lanes).all(|lane| gathered.extract(lane) == points[indices[lane] as usize][axis]));
+        // With and without the last point, beyond which nothing may be read.
+        for count in [40, 39, 38] {
+            let points: Vec<[S; 3]> = (0..count).map(|at| [0, 1, 2].map(|axis| number(10 * at + axis))).collect();
+            let indices: Vec<u32> = (0..lanes as u32).map(|lane| (7 * lane + 38) % count as u32).collect();
+            for (axis, gathered) in V::gather(&points, &indices).into_iter().enumerate() {
+                assert!((0..lanes).all(|lane| gathered.extract(lane) == points[indices[lane] as usize][axis]));
+            }
+        }
+        let points = vec![[number(1); 3]; 40];
+        for beyond in [40, u32::MAX] {
+            let indices: Vec<u32> = (0..lanes).map(|lane| if lane == lanes / 2 { beyond } else { 0 }).collect();
+            let gathered = std::panic::catch_unwind(|| V::gather(&points, &indices).map(|lanes| lanes.extract(0)));
+            assert!(gathered.is_err(), "point {beyond} of 40");
         }
         let all = (1 << lanes) - 1;
         assert_eq!((V::Mask::none().bits(), (!V::Mask::none()).bits() & all), (0, all));

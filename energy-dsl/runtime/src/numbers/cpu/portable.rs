@@ -3,10 +3,9 @@
 
 use std::ops::{BitAnd, BitOr, Not};
 
-use super::lanes::Lanes;
-use super::register::{DoubleRegister, Register, SingleRegister, elementary_of_doubles, elementary_of_singles};
-use crate::numbers::elementary::{Binary, Double, Unary, sin_cos};
-use crate::numbers::level::{Baseline, Kernel, Level};
+use super::register::Register;
+use crate::numbers::elementary::Bits;
+use crate::numbers::level::{Baseline, Kernel};
 use crate::numbers::real::Mask;
 
 /// A register of two doubles.
@@ -20,7 +19,7 @@ pub struct F64x2([f64; 2]);
 pub struct F32x4([f32; 4]);
 
 macro_rules! array_register {
-    ($register:ident, $mask:ident, $float:ident, $lanes:literal, [$($i:literal)*], $elementary:ident) => {
+    ($register:ident, $mask:ident, $float:ident, $lanes:literal, [$($i:literal)*]) => {
         /// One `bool` per lane.
         #[derive(Clone, Copy, Debug)]
         pub struct $mask([bool; $lanes]);
@@ -163,39 +162,21 @@ macro_rules! array_register {
             fn sub_bits(a: Self, b: Self) -> Self {
                 Self([$($float::from_bits(a.0[$i].to_bits().wrapping_sub(b.0[$i].to_bits()))),*])
             }
-            $elementary!();
+            #[inline(always)]
+            fn low_bits_to_exponent(a: Self) -> Self {
+                Self([$(a.0[$i].low_bits_to_exponent()),*])
+            }
+            #[inline(always)]
+            fn exponent_to_low_bits(a: Self) -> Self {
+                Self([$(a.0[$i].exponent_to_low_bits()),*])
+            }
+            #[inline(always)]
+            fn bit_1_to_sign(a: Self) -> Self {
+                Self([$(a.0[$i].bit_1_to_sign()),*])
+            }
         }
     };
 }
 
-array_register!(F64x2, Mask64x2, f64, 2, [0 1], elementary_of_doubles);
-array_register!(F32x4, Mask32x4, f32, 4, [0 1 2 3], elementary_of_singles);
-
-impl DoubleRegister for F64x2 {
-    #[inline(always)]
-    fn low_bits_to_exponent(a: Self) -> Self {
-        Self([a.0[0].low_bits_to_exponent(), a.0[1].low_bits_to_exponent()])
-    }
-    #[inline(always)]
-    fn exponent_to_low_bits(a: Self) -> Self {
-        Self([a.0[0].exponent_to_low_bits(), a.0[1].exponent_to_low_bits()])
-    }
-    #[inline(always)]
-    fn bit_1_to_sign(a: Self) -> Self {
-        Self([a.0[0].bit_1_to_sign(), a.0[1].bit_1_to_sign()])
-    }
-}
-
-impl SingleRegister for F32x4 {
-    type Double = F64x2;
-
-    #[inline(always)]
-    fn widen(a: Self) -> [F64x2; 2] {
-        let [a, b, c, d] = a.0;
-        [F64x2([f64::from(a), f64::from(b)]), F64x2([f64::from(c), f64::from(d)])]
-    }
-    #[inline(always)]
-    fn narrow([F64x2([a, b]), F64x2([c, d])]: [F64x2; 2]) -> Self {
-        Self([a as f32, b as f32, c as f32, d as f32])
-    }
-}
+array_register!(F64x2, Mask64x2, f64, 2, [0 1]);
+array_register!(F32x4, Mask32x4, f32, 4, [0 1 2 3]);

@@ -1,9 +1,9 @@
 //! The operations of a processor's register. [`super::lanes`] turns registers into numbers.
 
 use super::lanes::Lanes;
-use crate::numbers::elementary::{Binary, Unary};
+use crate::numbers::elementary::Format;
 use crate::numbers::lane::{Lane, check_transposed, gather_by_element, transpose_by_element};
-use crate::numbers::level::{Kernel, Level};
+use crate::numbers::level::Kernel;
 use crate::numbers::real::{Mask, Number};
 use crate::numbers::unbounded::{OnSlices, Unbounded, WithCare, on_slices};
 
@@ -113,7 +113,7 @@ scalar!(f32, u32, on_slices::<W, _, INPUTS, OUTPUTS>, 23, 127, 4097.0, 12, 16.0,
 /// register.
 pub trait Register: Copy {
     /// The type of one lane.
-    type Scalar: Scalar;
+    type Scalar: Format;
     /// The outcome of a comparison.
     type Mask: Mask;
     /// Number of lanes.
@@ -181,77 +181,10 @@ pub trait Register: Copy {
         transpose_by_element(numbers, count, out, stride);
     }
 
-    /// Applies an elementary function to each lane.
-    fn unary<F: Unary, L: Level>(a: Self) -> Self;
-    /// Returns sine and cosine of each lane.
-    fn sin_cos<L: Level>(a: Self) -> (Self, Self);
-    /// Applies a binary elementary function lane by lane.
-    fn binary<F: Binary, L: Level>(a: Self, b: Self) -> Self;
-}
-
-/// A register of doubles with the shifts that elementary functions need.
-pub trait DoubleRegister: Register<Scalar = f64> {
-    /// Shifts each lane left by 52 bits.
+    /// Shifts each lane left by the bits of the mantissa.
     fn low_bits_to_exponent(a: Self) -> Self;
-    /// Shifts each lane right by 52 bits.
+    /// Shifts each lane right by the bits of the mantissa.
     fn exponent_to_low_bits(a: Self) -> Self;
-    /// Shifts each lane left by 62 bits and keeps only the sign bit.
+    /// Shifts bit 1 to the sign and keeps only the sign bit.
     fn bit_1_to_sign(a: Self) -> Self;
 }
-
-/// A register of single-precision numbers. Half of them fill a register of doubles.
-pub trait SingleRegister: Register<Scalar = f32> {
-    /// The register of doubles with the same number of bits.
-    type Double: DoubleRegister;
-
-    /// Converts both halves to double precision.
-    fn widen(a: Self) -> [Self::Double; 2];
-    /// Rounds two registers of doubles to the two halves.
-    fn narrow(halves: [Self::Double; 2]) -> Self;
-}
-
-/// Implements the elementary functions of a register of doubles.
-macro_rules! elementary_of_doubles {
-    () => {
-        #[inline(always)]
-        fn unary<F: Unary, L: Level>(a: Self) -> Self {
-            F::of::<_, L>(Lanes(a)).0
-        }
-        #[inline(always)]
-        fn sin_cos<L: Level>(a: Self) -> (Self, Self) {
-            let (sine, cosine) = sin_cos::<_, L>(Lanes(a));
-            (sine.0, cosine.0)
-        }
-        #[inline(always)]
-        fn binary<F: Binary, L: Level>(a: Self, b: Self) -> Self {
-            F::of::<_, L>(Lanes(a), Lanes(b)).0
-        }
-    };
-}
-
-/// Implements the elementary functions of a register of single-precision numbers through doubles. Closures are avoided,
-/// because they would not be compiled for the level.
-macro_rules! elementary_of_singles {
-    () => {
-        #[inline(always)]
-        fn unary<F: Unary, L: Level>(a: Self) -> Self {
-            let [low, high] = Self::widen(a);
-            Self::narrow([F::of::<_, L>(Lanes(low)).0, F::of::<_, L>(Lanes(high)).0])
-        }
-        #[inline(always)]
-        fn sin_cos<L: Level>(a: Self) -> (Self, Self) {
-            let [low, high] = Self::widen(a);
-            let (low, high) = (sin_cos::<_, L>(Lanes(low)), sin_cos::<_, L>(Lanes(high)));
-            (Self::narrow([low.0.0, high.0.0]), Self::narrow([low.1.0, high.1.0]))
-        }
-        #[inline(always)]
-        fn binary<F: Binary, L: Level>(a: Self, b: Self) -> Self {
-            let ([a_low, a_high], [b_low, b_high]) = (Self::widen(a), Self::widen(b));
-            let low = F::of_single::<_, L>(Lanes(a_low), Lanes(b_low)).0;
-            let high = F::of_single::<_, L>(Lanes(a_high), Lanes(b_high)).0;
-            Self::narrow([low, high])
-        }
-    };
-}
-
-pub(super) use {elementary_of_doubles, elementary_of_singles};

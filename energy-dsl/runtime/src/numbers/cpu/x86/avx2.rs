@@ -3,11 +3,10 @@
 use std::arch::x86_64::*;
 
 use super::super::lanes::Lanes;
-use super::super::register::{DoubleRegister, Register, SingleRegister, elementary_of_doubles, elementary_of_singles};
+use super::super::register::Register;
 use super::{intrinsics, mask, run_avx2, transpose};
-use crate::numbers::elementary::{Binary, Unary, sin_cos};
 use crate::numbers::lane::check_transposed;
-use crate::numbers::level::{Kernel, Level};
+use crate::numbers::level::Kernel;
 
 mask!(
     Mask4(__m256d),
@@ -73,8 +72,6 @@ impl Register for __m256d {
         transpose::gather_4(points, indices)
     }
 
-    elementary_of_doubles!();
-
     intrinsics! {
         fn splat(value: f64) -> Self = _mm256_set1_pd(value);
         fn add(a: Self, b: Self) -> Self = _mm256_add_pd(a, b);
@@ -96,6 +93,10 @@ impl Register for __m256d {
             _mm256_castsi256_pd(_mm256_add_epi64(_mm256_castpd_si256(a), _mm256_castpd_si256(b)));
         fn sub_bits(a: Self, b: Self) -> Self =
             _mm256_castsi256_pd(_mm256_sub_epi64(_mm256_castpd_si256(a), _mm256_castpd_si256(b)));
+        fn low_bits_to_exponent(a: Self) -> Self = _mm256_castsi256_pd(_mm256_slli_epi64::<52>(_mm256_castpd_si256(a)));
+        fn exponent_to_low_bits(a: Self) -> Self = _mm256_castsi256_pd(_mm256_srli_epi64::<52>(_mm256_castpd_si256(a)));
+        fn bit_1_to_sign(a: Self) -> Self =
+            _mm256_castsi256_pd(_mm256_slli_epi64::<63>(_mm256_srli_epi64::<1>(_mm256_castpd_si256(a))));
     }
 }
 
@@ -137,8 +138,6 @@ impl Register for __m256 {
         transpose::gather_8_single(points, indices)
     }
 
-    elementary_of_singles!();
-
     intrinsics! {
         fn splat(value: f32) -> Self = _mm256_set1_ps(value);
         fn add(a: Self, b: Self) -> Self = _mm256_add_ps(a, b);
@@ -160,25 +159,9 @@ impl Register for __m256 {
             _mm256_castsi256_ps(_mm256_add_epi32(_mm256_castps_si256(a), _mm256_castps_si256(b)));
         fn sub_bits(a: Self, b: Self) -> Self =
             _mm256_castsi256_ps(_mm256_sub_epi32(_mm256_castps_si256(a), _mm256_castps_si256(b)));
-    }
-}
-
-impl DoubleRegister for __m256d {
-    intrinsics! {
-        fn low_bits_to_exponent(a: Self) -> Self = _mm256_castsi256_pd(_mm256_slli_epi64::<52>(_mm256_castpd_si256(a)));
-        fn exponent_to_low_bits(a: Self) -> Self = _mm256_castsi256_pd(_mm256_srli_epi64::<52>(_mm256_castpd_si256(a)));
+        fn low_bits_to_exponent(a: Self) -> Self = _mm256_castsi256_ps(_mm256_slli_epi32::<23>(_mm256_castps_si256(a)));
+        fn exponent_to_low_bits(a: Self) -> Self = _mm256_castsi256_ps(_mm256_srli_epi32::<23>(_mm256_castps_si256(a)));
         fn bit_1_to_sign(a: Self) -> Self =
-            _mm256_castsi256_pd(_mm256_slli_epi64::<63>(_mm256_srli_epi64::<1>(_mm256_castpd_si256(a))));
-    }
-}
-
-impl SingleRegister for __m256 {
-    type Double = __m256d;
-
-    intrinsics! {
-        fn widen(a: Self) -> [__m256d; 2] =
-            [_mm256_cvtps_pd(_mm256_castps256_ps128(a)), _mm256_cvtps_pd(_mm256_extractf128_ps::<1>(a))];
-        fn narrow(halves: [__m256d; 2]) -> Self =
-            _mm256_set_m128(_mm256_cvtpd_ps(halves[1]), _mm256_cvtpd_ps(halves[0]));
+            _mm256_castsi256_ps(_mm256_slli_epi32::<31>(_mm256_srli_epi32::<1>(_mm256_castps_si256(a))));
     }
 }

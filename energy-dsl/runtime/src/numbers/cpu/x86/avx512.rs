@@ -3,11 +3,10 @@
 use std::arch::x86_64::*;
 
 use super::super::lanes::Lanes;
-use super::super::register::{DoubleRegister, Register, SingleRegister, elementary_of_doubles, elementary_of_singles};
+use super::super::register::Register;
 use super::{intrinsics, mask, run_avx512, transpose};
-use crate::numbers::elementary::{Binary, Unary, sin_cos};
 use crate::numbers::lane::check_transposed;
-use crate::numbers::level::{Kernel, Level};
+use crate::numbers::level::Kernel;
 
 mask!(
     Mask8(__mmask8), none: 0, bits: |m| u32::from(m), from_bits: |b| b as _,
@@ -57,8 +56,6 @@ impl Register for __m512d {
         transpose::gather_8(points, indices)
     }
 
-    elementary_of_doubles!();
-
     intrinsics! {
         fn splat(value: f64) -> Self = _mm512_set1_pd(value);
         fn add(a: Self, b: Self) -> Self = _mm512_add_pd(a, b);
@@ -80,6 +77,10 @@ impl Register for __m512d {
             _mm512_castsi512_pd(_mm512_add_epi64(_mm512_castpd_si512(a), _mm512_castpd_si512(b)));
         fn sub_bits(a: Self, b: Self) -> Self =
             _mm512_castsi512_pd(_mm512_sub_epi64(_mm512_castpd_si512(a), _mm512_castpd_si512(b)));
+        fn low_bits_to_exponent(a: Self) -> Self = _mm512_castsi512_pd(_mm512_slli_epi64::<52>(_mm512_castpd_si512(a)));
+        fn exponent_to_low_bits(a: Self) -> Self = _mm512_castsi512_pd(_mm512_srli_epi64::<52>(_mm512_castpd_si512(a)));
+        fn bit_1_to_sign(a: Self) -> Self =
+            _mm512_castsi512_pd(_mm512_slli_epi64::<63>(_mm512_srli_epi64::<1>(_mm512_castpd_si512(a))));
     }
 }
 
@@ -121,8 +122,6 @@ impl Register for __m512 {
         transpose::gather_16_single(points, indices)
     }
 
-    elementary_of_singles!();
-
     intrinsics! {
         fn splat(value: f32) -> Self = _mm512_set1_ps(value);
         fn add(a: Self, b: Self) -> Self = _mm512_add_ps(a, b);
@@ -144,25 +143,9 @@ impl Register for __m512 {
             _mm512_castsi512_ps(_mm512_add_epi32(_mm512_castps_si512(a), _mm512_castps_si512(b)));
         fn sub_bits(a: Self, b: Self) -> Self =
             _mm512_castsi512_ps(_mm512_sub_epi32(_mm512_castps_si512(a), _mm512_castps_si512(b)));
-    }
-}
-
-impl DoubleRegister for __m512d {
-    intrinsics! {
-        fn low_bits_to_exponent(a: Self) -> Self = _mm512_castsi512_pd(_mm512_slli_epi64::<52>(_mm512_castpd_si512(a)));
-        fn exponent_to_low_bits(a: Self) -> Self = _mm512_castsi512_pd(_mm512_srli_epi64::<52>(_mm512_castpd_si512(a)));
+        fn low_bits_to_exponent(a: Self) -> Self = _mm512_castsi512_ps(_mm512_slli_epi32::<23>(_mm512_castps_si512(a)));
+        fn exponent_to_low_bits(a: Self) -> Self = _mm512_castsi512_ps(_mm512_srli_epi32::<23>(_mm512_castps_si512(a)));
         fn bit_1_to_sign(a: Self) -> Self =
-            _mm512_castsi512_pd(_mm512_slli_epi64::<63>(_mm512_srli_epi64::<1>(_mm512_castpd_si512(a))));
-    }
-}
-
-impl SingleRegister for __m512 {
-    type Double = __m512d;
-
-    intrinsics! {
-        fn widen(a: Self) -> [__m512d; 2] =
-            [_mm512_cvtps_pd(_mm512_castps512_ps256(a)), _mm512_cvtps_pd(_mm512_extractf32x8_ps::<1>(a))];
-        fn narrow(halves: [__m512d; 2]) -> Self =
-            _mm512_insertf32x8::<1>(_mm512_castps256_ps512(_mm512_cvtpd_ps(halves[0])), _mm512_cvtpd_ps(halves[1]));
+            _mm512_castsi512_ps(_mm512_slli_epi32::<31>(_mm512_srli_epi32::<1>(_mm512_castps_si512(a))));
     }
 }

@@ -232,14 +232,14 @@ pub fn gather_8(points: &[[f64; 3]], indices: &[u32]) -> [__m512d; 3] {
 /// If a point does not exist, or indices are too few.
 #[inline(always)]
 pub fn gather_8_single(points: &[[f32; 3]], indices: &[u32]) -> [__m256; 3] {
-    let indices = &indices[..8];
-    let mut rows = [[load_single(&points[indices[0] as usize]); 2]; 4];
-    for lane in 0..8 {
-        rows[lane % 4][lane / 4] = load_single(&points[indices[lane] as usize]);
-    }
-    let [a, b, c, d] = rows;
-    // SAFETY: registers exist where the features were detected.
+    let (indices, last) = (&indices[..8], last_index(points.len()));
+    // SAFETY: registers exist where the features were detected, and the slice has eight indices. It is checked which
+    // points are inner ones; for these, plain loads are faster than masked ones.
     unsafe {
+        let numbers = _mm256_loadu_si256(indices.as_ptr().cast());
+        let smaller = _mm256_min_epu32(numbers, _mm256_set1_epi32(last.wrapping_sub(1).cast_signed()));
+        let are_inner = last > 0 && _mm256_movemask_epi8(_mm256_cmpeq_epi32(numbers, smaller)) == -1;
+        let [a, b, c, d] = load_rows::<2>(points, indices, are_inner);
         let [x, y, z, _] = fours_8([
             _mm256_set_m128(a[1], a[0]),
             _mm256_set_m128(b[1], b[0]),
@@ -256,14 +256,12 @@ pub fn gather_8_single(points: &[[f32; 3]], indices: &[u32]) -> [__m256; 3] {
 /// If a point does not exist, or indices are too few.
 #[inline(always)]
 pub fn gather_16_single(points: &[[f32; 3]], indices: &[u32]) -> [__m512; 3] {
-    let indices = &indices[..16];
-    let mut rows = [[load_single(&points[indices[0] as usize]); 4]; 4];
-    for lane in 0..16 {
-        rows[lane % 4][lane / 4] = load_single(&points[indices[lane] as usize]);
-    }
-    let [a, b, c, d] = rows;
-    // SAFETY: registers exist where the features were detected.
+    let (indices, last) = (&indices[..16], last_index(points.len()));
+    // SAFETY: as for eight indices.
     unsafe {
+        let numbers = _mm512_loadu_si512(indices.as_ptr().cast());
+        let are_inner = _mm512_cmplt_epu32_mask(numbers, _mm512_set1_epi32(last.cast_signed())) == u16::MAX;
+        let [a, b, c, d] = load_rows::<4>(points, indices, are_inner);
         let [x, y, z, _] = fours_16([joined(a), joined(b), joined(c), joined(d)]);
         [x, y, z]
     }
@@ -274,6 +272,34 @@ pub fn gather_16_single(points: &[[f32; 3]], indices: &[u32]) -> [__m512; 3] {
 #[inline]
 fn joined([a, b, c, d]: [__m128; 4]) -> __m512 {
     _mm512_insertf32x8::<1>(_mm512_castps256_ps512(_mm256_set_m128(b, a)), _mm256_set_m128(d, c))
+}
+
+/// Returns the index of the last of some points, or a smaller one.
+#[inline(always)]
+fn last_index(count: usize) -> u32 {
+    u32::try_from(count.saturating_sub(1)).unwrap_or(u32::MAX)
+}
+
+/// Loads the points of 4 N indices with one more number each: number `i` in row `i % 4`.
+///
+/// # Safety
+/// If `are_inner`, the indices are below that of the last point.
+#[inline(always)]
+unsafe fn load_rows<const N: usize>(points: &[[f32; 3]], indices: &[u32], are_inner: bool) -> [[__m128; N]; 4] {
+    let indices = &indices[..4 * N];
+    // SAFETY: registers exist where the features were detected.
+    let mut rows = [[unsafe { _mm_setzero_ps() }; N]; 4];
+    if are_inner {
+        for (lane, &index) in indices.iter().enumerate() {
+            // SAFETY: the point and the next one exist. Loads need no alignment.
+            rows[lane % 4][lane / 4] = unsafe { _mm_loadu_ps(points.as_ptr().add(index as usize).cast()) };
+        }
+    } else {
+        for (lane, &index) in indices.iter().enumerate() {
+            rows[lane % 4][lane / 4] = load_single(&points[index as usize]);
+        }
+    }
+    rows
 }
 
 /// Loads a point and a zero.
