@@ -2,7 +2,7 @@
 
 use crate::barrier::{
     BarrierContact, ContactError, Feature, FirstPush, GAP_PER_THICKNESS, LARGEST_REACH, ObstacleStart, Participants,
-    Untangling, thinning,
+    Untangling, local_thinning,
 };
 use crate::collision::CollisionMesh;
 use crate::contact::{AnySolid, Obstacle};
@@ -52,12 +52,11 @@ fn participants(island: &Island, model: &mut Model, with_itself: bool) -> Partic
     vertices.iter().enumerate().for_each(|(place, &vertex)| local[vertex] = Some(place));
     let own = mesh_of(model).restricted(&local, vertices.len());
     let x = &island.body().x;
-    let shortest = own.shortest_edge(x);
     let all: Vec<f64> = vertices.iter().map(|&vertex| model.thickness[vertex]).collect();
     let thickest = all.iter().copied().fold(0.0, f64::max);
-    let scale = thinning(thickest, shortest);
-    if scale < 1.0 {
-        note(model, note_on_thickness(scale, thickest, shortest));
+    let kept = local_thinning(&own, x, thickest);
+    if kept.iter().any(|&part| part < 1.0) {
+        note(model, note_on_thickness(&kept, thickest, own.shortest_edge(x)));
     }
     let start = |(obstacle, radius): (&Obstacle, f64)| ObstacleStart {
         name: obstacle.name.clone(),
@@ -67,8 +66,8 @@ fn participants(island: &Island, model: &mut Model, with_itself: bool) -> Partic
     let cores = island.prescribed().cores();
     Participants {
         is_free: (0..x.len()).map(|place| vertices.get(place).is_some_and(|&own| !model.pinned_forever[own])).collect(),
-        radii: all.iter().map(|thickness| 0.5 * scale * thickness).collect(),
-        gap: GAP_PER_THICKNESS * scale * thickest,
+        radii: all.iter().zip(&kept).map(|(thickness, kept)| 0.5 * kept * thickness).collect(),
+        gaps: kept.iter().map(|kept| GAP_PER_THICKNESS * kept * thickest).collect(),
         obstacles: model.obstacles.iter().zip(cores.iter().map(|core| core.radius)).map(start).collect(),
         exclusions: model.exclusions.restricted(&local, vertices.len()),
         with_itself,
@@ -83,13 +82,17 @@ fn note(model: &mut Model, note: String) {
     }
 }
 
-/// Says that fabrics are thinner in contact than described.
-fn note_on_thickness(scale: f64, thickest: f64, shortest: f64) -> String {
-    let [thickest, thinned, shortest] = [thickest, scale * thickest, shortest].map(|length| 1e3 * length);
+/// Says where fabrics are thinner in contact than described.
+fn note_on_thickness(kept: &[f64], thickest: f64, shortest: f64) -> String {
+    let least = kept.iter().copied().fold(1.0, f64::min);
+    let count = kept.iter().filter(|part| **part < 1.0).count();
+    let [thickest, thinned, shortest] = [thickest, least * thickest, shortest].map(|length| 1e3 * length);
     format!(
-        "contact gives fabrics {:.1} % of their thickness, {thinned:.3} mm instead of {thickest:.3} mm: the shortest \
-         edge, of {shortest:.3} mm, must be longer than {:.1} times the reach of contact",
-        100.0 * scale,
+        "contact gives {count} of {} vertices less than their thickness, down to {:.1} %, {thinned:.3} mm instead of \
+         {thickest:.3} mm: edges, the shortest of {shortest:.3} mm, must be longer than {:.1} times the reach of \
+         contact around them. Merge vertices of short edges with `weld`, or use a coarser mesh",
+        kept.len(),
+        100.0 * least,
         1.0 / LARGEST_REACH
     )
 }

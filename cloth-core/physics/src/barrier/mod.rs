@@ -51,7 +51,7 @@ use crate::collision::{Closest, CollisionMesh, Move, Neighbourhood, Pair, Search
 use active_set::{ActivePart, ActiveSet};
 use friction::Friction;
 use law::{Barrier, Order};
-pub use spacing::{GAP_PER_THICKNESS, LARGEST_REACH, thinning};
+pub use spacing::{GAP_PER_THICKNESS, LARGEST_REACH, local_thinning, thinning};
 use spacing::{Spacing, Spacings};
 use step::BarrierStep;
 

@@ -141,8 +141,8 @@ pub struct Participants {
     pub is_free: Vec<bool>,
     /// Half of the thickness of cloth and hair at each vertex, in m.
     pub radii: Vec<f64>,
-    /// The activation gap between parts of cloth and hair, in m.
-    pub gap: f64,
+    /// The activation gap between parts of cloth and hair at each vertex, in m.
+    pub gaps: Vec<f64>,
     /// The obstacles, in the order of their cores.
     pub obstacles: Vec<ObstacleStart>,
     /// Pairs that do not collide.
@@ -189,7 +189,8 @@ impl BarrierContact {
         gap: f64,
     ) -> Result<Self, ContactError> {
         let (obstacles, exclusions) = Default::default();
-        Self::among(Participants { mesh, is_free, radii, gap, obstacles, exclusions, with_itself: true }, x)
+        let gaps = vec![gap; radii.len()];
+        Self::among(Participants { mesh, is_free, radii, gaps, obstacles, exclusions, with_itself: true }, x)
     }
 
     /// Creates the contact of cloth and hair with themselves and with obstacles, which start at x.
@@ -197,9 +198,10 @@ impl BarrierContact {
     /// # Errors
     /// If something crosses at x, or a pair that can respond is closer than its thickness.
     pub fn among(participants: Participants, x: &[Vector3<f64>]) -> Result<Self, ContactError> {
-        let Participants { mesh, is_free, radii, gap, obstacles, exclusions, with_itself } = participants;
+        let Participants { mesh, is_free, radii, gaps, obstacles, exclusions, with_itself } = participants;
+        let gap = gaps.iter().copied().fold(0.0, f64::max);
         let skin = |start: &ObstacleStart| Skin { radius: start.radius, thickness: 0.0, gap: start.reach };
-        let spacings = Spacings { radii, gap, skins: obstacles.iter().map(skin).collect() };
+        let spacings = Spacings { radii, gaps, skins: obstacles.iter().map(skin).collect() };
         let rules = Rules { halves: spacings.halves(&mesh), is_free, exclusions, with_itself };
         let mut search = Search::new(&mesh, x, rules);
         if !search.is_clear(&mesh, &MovingBalls { ends: [x, x], radii: &vec![0.0; x.len()] }) {

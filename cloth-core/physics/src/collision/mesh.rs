@@ -159,6 +159,28 @@ impl CollisionMesh {
         self.edges[..self.own_features()[2]].iter().map(length).fold(f64::INFINITY, f64::min)
     }
 
+    /// Returns, for each vertex, the length of the shortest edge of cloth and hair that it or a triangle with it has at
+    /// x, in m; infinity for a vertex without edges.
+    #[must_use]
+    pub(crate) fn shortest_edges(&self, x: &[Vector3<f64>]) -> Vec<f64> {
+        let mut shortest = vec![f64::INFINITY; self.vertices()];
+        let mut note = |vertex: u32, length: f64| {
+            let known = &mut shortest[vertex as usize];
+            *known = known.min(length);
+        };
+        for (number, &[a, b]) in self.own_edges().iter().enumerate() {
+            let length = norm(subtract(x[a as usize], x[b as usize]));
+            [a, b].iter().chain(self.apexes(number)).for_each(|&vertex| note(vertex, length));
+        }
+        shortest
+    }
+
+    /// The edges of cloth and hair.
+    #[must_use]
+    pub(crate) fn own_edges(&self) -> &[[u32; 2]] {
+        &self.edges[..self.own_features()[2]]
+    }
+
     /// Returns the mean length of the edges of cloth and hair at x, in m.
     #[must_use]
     pub(crate) fn mean_edge(&self, x: &[Vector3<f64>]) -> f64 {

@@ -42,11 +42,12 @@ impl Untangling<'_> {
     /// Returns positions near x at which nothing crosses, and pairs keep their thickness. `None` if x has crossings
     /// that are too deep.
     pub fn repair(&self, x: &[Vector3<f64>]) -> Option<Vec<Vector3<f64>>> {
-        let Participants { mesh, radii, gap, obstacles, exclusions, with_itself, .. } = self.participants;
+        let Participants { mesh, radii, gaps, obstacles, exclusions, with_itself, .. } = self.participants;
         let skin = |reach: f64, radius: f64| Skin { radius, thickness: SKIN * reach, gap: (1.0 - SKIN) * reach };
         let skins = obstacles.iter().map(|obstacle| skin(obstacle.reach, obstacle.radius)).collect();
-        let spacings = Spacings { radii: radii.clone(), gap: *gap, skins };
-        let reach = obstacles.iter().map(|obstacle| obstacle.reach).fold(2.0 * largest(radii) + gap, f64::max);
+        let spacings = Spacings { radii: radii.clone(), gaps: gaps.clone(), skins };
+        let own = 2.0 * largest(radii) + largest(gaps);
+        let reach = obstacles.iter().map(|obstacle| obstacle.reach).fold(own, f64::max);
         // A feature on the wrong side is at a distance equal to its depth.
         let halves = spacings.halves(mesh).iter().map(|half| half + 0.5 * reach).collect();
         let (is_free, exclusions) = (self.participants.is_free.clone(), exclusions.clone());

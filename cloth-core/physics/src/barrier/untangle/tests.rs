@@ -49,7 +49,7 @@ impl Sheets {
             mesh: CollisionMesh::new(vertices, &self.triangles, &[], &[]),
             is_free: vec![true; vertices],
             radii: vec![0.5 * THICKNESS; vertices],
-            gap: GAP,
+            gaps: vec![GAP; vertices],
             obstacles: Vec::new(),
             exclusions: Exclusions::default(),
             with_itself: true,
