@@ -297,5 +297,9 @@ fn notes_tell_what_contact_does_to_the_start() {
     let expected = "cloth and plane 0 start 3.000 mm apart, within the reach of contact, 5.000 mm";
     assert!(near.starts_with(expected) && near.ends_with("or reduce the `thickness` of plane 0"), "{near}");
     let fine = notes(&(head("on", "") + &sheet("cloth", 5, 0.005, [0.0; 3], "")));
-    assert!(fine.starts_with("contact gives fabrics ") && fine.contains("instead of 1.000 mm"), "{fine}");
+    assert!(fine.starts_with("contact gives 36 of 36 vertices less ") && fine.contains("of 1.000 mm"), "{fine}");
+    // Fine cloth beside it does not thin coarse cloth.
+    let coarse = sheet("coarse", 5, 0.2, [1.0, 0.0, 0.0], "");
+    let both = notes(&(head("on", "") + &sheet("cloth", 5, 0.005, [0.0; 3], "") + &coarse));
+    assert!(both.starts_with("contact gives 36 of 72 vertices less "), "{both}");
 }

@@ -86,15 +86,20 @@ fn note(model: &mut Model, note: String) {
 fn note_on_thickness(kept: &[f64], thickest: f64, shortest: f64) -> String {
     let least = kept.iter().copied().fold(1.0, f64::min);
     let count = kept.iter().filter(|part| **part < 1.0).count();
-    let [thickest, thinned, shortest] = [thickest, least * thickest, shortest].map(|length| 1e3 * length);
+    let [thickest, thinned, shortest] = [thickest, least * thickest, shortest].map(millimetres);
     format!(
-        "contact gives {count} of {} vertices less than their thickness, down to {:.1} %, {thinned:.3} mm instead of \
-         {thickest:.3} mm: edges, the shortest of {shortest:.3} mm, must be longer than {:.1} times the reach of \
-         contact around them. Merge vertices of short edges with `weld`, or use a coarser mesh",
+        "contact gives {count} of {} vertices less than their thickness, down to {thinned} mm instead of {thickest} mm: \
+         edges, the shortest of {shortest} mm, must be longer than {:.1} times the reach of contact around them. Merge \
+         vertices of short edges with `weld`, or use a coarser mesh",
         kept.len(),
-        100.0 * least,
         1.0 / LARGEST_REACH
     )
+}
+
+/// Writes a length in m as millimetres, with at least two digits.
+fn millimetres(length: f64) -> String {
+    let length = 1e3 * length;
+    if length < 0.01 { format!("{length:.1e}") } else { format!("{length:.3}") }
 }
 
 /// Says that contact pushes cloth away at the start.

@@ -369,6 +369,34 @@ mod tests {
         assert!(error < 1e-12 * LENGTH, "{deflection:?}");
     }
 
+    #[test]
+    fn the_secant_leads_from_rest_to_the_force() {
+        let (weights, straight) = ([1.0, -0.5, -0.3, -0.2], [0.0; 3]);
+        let one = LaggedPair { pair: pair([0, 3, 4, 5]), weights, anchor: None, normal: UP, straight };
+        let elements = vec![Packed::new(&[SlidingFriction::new(UP, straight, 2.0, SOFTNESS)], &[[0_u32]])];
+        let friction = Friction { lagged: Some(LaggedPairs { pairs: vec![one], elements }), ..Friction::default() };
+        for sliding in [1e-9, 1e-6, 1e-5, 3e-4] {
+            let (mut x, mut force) = ([[0.0; 3]; 6], [[0.0; 3]; 6]);
+            let along = [0.6, -0.8, 0.0];
+            x[0] = add_scaled([0.0, 0.0, 1e-3], sliding, along);
+            friction.add_force(&x, 1, &mut force);
+            let stiffness = |sliding| friction.stiffness(&x, sliding, 1).blocks[0];
+            let [exact, secant] = [SlidingStiffness::Exact, SlidingStiffness::Secant].map(stiffness);
+            let times = |block: Block<f64>, vector: Vector3<f64>| block.map(|row| dot(row, vector));
+            let pull = times(secant, add_scaled([0.0; 3], sliding, along));
+            assert!(
+                (0..3).all(|axis| (pull[axis] + force[0][axis]).abs() < 1e-6 * norm(force[0])),
+                "{pull:?} {force:?}"
+            );
+            // Both are the same across the slide, and the secant is stiffer along it.
+            let across = [0.8, 0.6, 0.0];
+            let [softer, stiffer] = [exact, secant].map(|block| dot(along, times(block, along)));
+            let sides = [exact, secant].map(|block| dot(across, times(block, across)));
+            assert!((sides[0] / sides[1] - 1.0).abs() < 1e-5 && norm(times(secant, UP)) < 1e-9 * stiffer);
+            assert!(softer <= (1.0 + 1e-5) * stiffer && (sliding < 1e-5 || softer < 0.6 * stiffer));
+        }
+    }
+
     /// Returns a pair on an obstacle that moves, and the closest points on cloth and obstacle.
     fn on_obstacle(cloth_is_first: bool) -> (LaggedPair, [Vector3<f64>; 2]) {
         let core = Core { vertices: POSITIONS[3..6].to_vec(), triangles: vec![[0, 1, 2]], ..Core::default() };

@@ -174,3 +174,45 @@ impl IncrementalPotential<'_> {
 pub(super) fn shared(certified: f64) -> f64 {
     if certified == 1.0 { 1.0 } else { SHARE * certified }
 }
+
+#[cfg(test)]
+mod tests {
+    use energy_elements::HookeSpring;
+    use energy_solve::{ElementList, PotentialTerm, System};
+
+    use super::*;
+    use crate::body::Body;
+
+    /// A chain of two springs, whose first end moves.
+    fn chain() -> Body {
+        let springs = vec![HookeSpring::new(3.0, 0.0), HookeSpring::new(5.0, 0.0)];
+        let springs = PotentialTerm::new(ElementList::new("springs", springs, &[[0, 1], [1, 2]]).unwrap());
+        let system = System::new(vec![Box::new(springs)], &[true, false, false]).unwrap();
+        let x = vec![[0.0; 3], [1.0, 0.0, 0.0], [1.5, 0.5, 0.0]];
+        Body { x, v: vec![[2.0, 0.0, 0.0], [0.0; 3], [0.0; 3]], masses: vec![1.0, 2.0, 0.5], system }
+    }
+
+    #[test]
+    fn the_way_of_pins_pulls_on_their_neighbours() {
+        let dt = 0.1;
+        let mut body = chain();
+        let x = body.x.clone();
+        let mut potential = IncrementalPotential::new(&mut body, None, dt);
+        let way = potential.rest_of_way(&x);
+        assert_eq!(way, [[0.2, 0.0, 0.0], [0.0; 3], [0.0; 3]]);
+        let here = potential.whole_gradient(&x).unwrap();
+        let change = potential.change(&x, &here, &way).unwrap().unwrap();
+        // h² k Δp of the first spring, whose rest length is 0.
+        let expected = [[0.006, 0.0, 0.0], [-0.006, 0.0, 0.0], [0.0; 3]];
+        for (found, expected) in change.iter().zip(expected) {
+            assert!((0..3).all(|axis| (found[axis] - expected[axis]).abs() < 1e-8), "{change:?}");
+        }
+        // Inertia and both springs at the free vertices.
+        let way = [[0.0; 3], [0.0, 0.1, 0.0], [0.0; 3]];
+        let change = potential.change(&x, &here, &way).unwrap().unwrap();
+        assert!((change[1][1] - 0.1 * (2.0 + dt * dt * 8.0)).abs() < 1e-7, "{change:?}");
+        // At the end of their way, pins are where they should be, to the bit.
+        let end = potential.along(&x, 1.0, &potential.rest_of_way(&x));
+        assert_eq!(end[0], potential.inertial(0));
+    }
+}
