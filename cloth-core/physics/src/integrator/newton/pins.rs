@@ -18,7 +18,7 @@ use super::iterate::{Iterate, SECANTS};
 use super::largest;
 
 /// Moves of pins and obstacles within a step, after which they count as blocked.
-const PIN_MOVES: usize = 60;
+const PIN_MOVES: usize = 100;
 /// The longest displacement for differences of gradients, in m: far below the gaps of contact.
 const NUDGE: f64 = 1e-8;
 /// Halvings of a move before pins wait for an iteration without them.
@@ -80,6 +80,7 @@ impl Iterate<'_> {
         let (followed, solved) = self.solve(&downhill, self.projection.curvature, tolerance)?;
         let is_finite = followed.as_flattened().iter().all(|component| component.is_finite());
         if !is_finite || !solved.converged() {
+            self.projection.demand();
             return Ok(None);
         }
         free.iter().zip(followed).for_each(|(&vertex, vector)| vectors[vertex] = vector);
