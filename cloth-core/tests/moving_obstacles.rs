@@ -1,5 +1,5 @@
-//! Obstacles that hit, pinch and shake cloth: pins and obstacles move inside Newton's direction, so that hardly any step
-//! is rejected because they are blocked.
+//! Obstacles that hit, pinch and shake cloth: pins and obstacles move inside Newton's direction, so that hardly any
+//! step is rejected because they are blocked.
 
 use cloth_core::Simulation;
 use cloth_core::scene::Scene;
@@ -10,8 +10,9 @@ fn hanging(cells: usize, density: f64, stiffness: f64) -> String {
         "dt = 0.01\nintegrator = \"newton\"\nadaptive = true\ntolerances.velocity = 1e-3\n\
          [[garment]]\nname = \"cloth\"\n\
          mesh.sheet = {{ cells = [{cells}, {cells}], size = [0.6, 0.6], plane = \"vertical\" }}\n\
-         fabric = {{ density = {density:?}, friction = 0.3, material.neo-hookean = {{ stretch_stiffness = {stiffness:?}, \
-         poisson_ratio = 0.3, bending.flat.stiffness = 1e-5 }} }}\n\
+         [garment.fabric]\ndensity = {density:?}\nfriction = 0.3\n\
+         material.neo-hookean = {{ stretch_stiffness = {stiffness:?}, poisson_ratio = 0.3, \
+         bending.flat.stiffness = 1e-5 }}\n\
          [[pins]]\nnearest = [-0.3, 0.0, 0.3]\n[[pins]]\nnearest = [0.3, 0.0, 0.3]\n"
     )
 }

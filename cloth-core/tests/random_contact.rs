@@ -124,8 +124,8 @@ pub(super) fn scenes() -> u32 {
     std::env::var("PROPTEST_CASES").ok().and_then(|cases| cases.parse().ok()).unwrap_or(SCENES)
 }
 
-/// Runs a scene, and checks it: nothing crosses, all positions are finite, and a step fails only if the scene may demand the
-/// impossible.
+/// Runs a scene, and checks it: nothing crosses, all positions are finite, and a step fails only if the scene may demand
+/// the impossible.
 pub(super) fn check_run(dt: f64, rest: &str, may_be_impossible: bool) -> Result<(), TestCaseError> {
     let text = format!(
         "dt = {dt:?}\nduration = 10.0\nintegrator = \"newton\"\ncontact = \"on\"\nadaptive = true\n\

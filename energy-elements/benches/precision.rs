@@ -1,7 +1,7 @@
 //! Compares single with double precision in lanes: `cargo bench -p energy-elements --bench precision`.
 //!
-//! Prints nanoseconds per element for value, gradient and Hessian of 10,000 elements, and the ratio of the times. Rounds
-//! alternate between the precisions, and the fastest of each counts.
+//! Prints nanoseconds per element for value, gradient and Hessian of 10,000 elements, and the ratio of the times.
+//! Rounds alternate between the precisions, and the fastest of each counts.
 #![allow(missing_docs)]
 
 use std::array::from_fn;

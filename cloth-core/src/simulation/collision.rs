@@ -88,9 +88,9 @@ fn note_on_thickness(kept: &[f64], thickest: f64, shortest: f64) -> String {
     let count = kept.iter().filter(|part| **part < 1.0).count();
     let [thickest, thinned, shortest] = [thickest, least * thickest, shortest].map(millimetres);
     format!(
-        "contact gives {count} of {} vertices less than their thickness, down to {thinned} mm instead of {thickest} mm: \
-         edges, the shortest of {shortest} mm, must be longer than {:.1} times the reach of contact around them. Merge \
-         vertices of short edges with `weld`, or use a coarser mesh",
+        "contact gives {count} of {} vertices less than their thickness, down to {thinned} mm instead of {thickest} \
+         mm: edges, the shortest of {shortest} mm, must be longer than {:.1} times the reach of contact around them. \
+         Merge vertices of short edges with `weld`, or use a coarser mesh",
         kept.len(),
         1.0 / LARGEST_REACH
     )

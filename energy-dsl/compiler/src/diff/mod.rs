@@ -1,9 +1,9 @@
 //! Differentiates nodes of a graph. Derivatives are nodes of the same graph.
 //!
 //! Inputs are first *reduced*: if points enter only as differences or as other linear functions (`linear.rs`),
-//! derivatives are taken with respect to these (`coordinates.rs`). First derivatives flow forward as sparse dual parts (`forward.rs`) or back from the outputs
-//! (`adjoint.rs`). Second derivatives flow forward, weighted by adjoints, or are gathered at a few primitives
-//! (`cut.rs`). `routes.rs` takes the cheapest route.
+//! derivatives are taken with respect to these (`coordinates.rs`). First derivatives flow forward as sparse dual parts
+//! (`forward.rs`) or back from the outputs (`adjoint.rs`). Second derivatives flow forward, weighted by adjoints, or
+//! are gathered at a few primitives (`cut.rs`). `routes.rs` takes the cheapest route.
 
 mod adjoint;
 mod coordinates;

@@ -4,10 +4,10 @@ use super::{MOST, Square};
 
 /// Transformation between the vectors of an element's reduced coordinates and orthonormal ones with the same span.
 ///
-/// Let q = D x be the vectors, differences or other sums of the points (D ⊗ 1₃ acts on the points' coordinates) and H the Hessian by q. The Hessian
-/// by points is Dᵀ H D. With D Dᵀ = L Lᵀ, the rows of Q = L⁻¹ D are orthonormal, and Dᵀ H D = Qᵀ (Lᵀ H L) Q. Its
-/// eigenvalues are zeros and those of Lᵀ H L. Therefore the projection acts on Lᵀ H L, not on H, whose eigenvalues
-/// differ.
+/// Let q = D x be the vectors, differences or other sums of the points (D ⊗ 1₃ acts on the points' coordinates) and H
+/// the Hessian by q. The Hessian by points is Dᵀ H D. With D Dᵀ = L Lᵀ, the rows of Q = L⁻¹ D are orthonormal, and Dᵀ H
+/// D = Qᵀ (Lᵀ H L) Q. Its eigenvalues are zeros and those of Lᵀ H L. Therefore the projection acts on Lᵀ H L, not on H,
+/// whose eigenvalues differ.
 #[derive(Clone, Debug)]
 pub(crate) struct Orthonormal {
     /// The triangle L.

@@ -39,8 +39,8 @@ use iterate::Iterate;
 ///   steps are doubled as long as that lowers E further.
 ///
 /// If the body collides, every move is certified to have no crossing ([`ContactStep::filter_step`]): the warm start,
-/// the motion of pins, each trial step and each lengthened step. Pins and obstacles that meet cloth move inside Newton's
-/// direction, so that cloth makes way while they come.
+/// the motion of pins, each trial step and each lengthened step. Pins and obstacles that meet cloth move inside
+/// Newton's direction, so that cloth makes way while they come.
 ///
 /// Every force other than drag needs an energy or a dissipation function. [`crate::fabric::Bending::BridsonForce`] has
 /// neither, and springs damped along their length have unsymmetric Jacobians: use [`super::ImplicitEuler`] for both.

@@ -4,9 +4,9 @@
 //!
 //! ∂²E/∂x² d = −∂E/∂x − ∂²E/∂x∂p Δp:
 //!
-//! cloth makes way while an obstacle comes, and is drawn along while it sticks to one. One length s scales d and Δp, and
-//! one certificate covers both. Pins do work, so E may grow on the way, but not much faster than its expansion to second
-//! order says.
+//! cloth makes way while an obstacle comes, and is drawn along while it sticks to one. One length s scales d and Δp,
+//! and one certificate covers both. Pins do work, so E may grow on the way, but not much faster than its expansion to
+//! second order says.
 
 use energy_dsl::Vector3;
 use energy_solve::{EvaluationError, dot};
@@ -25,8 +25,8 @@ const NUDGE: f64 = 1e-8;
 const HALVINGS: usize = 6;
 /// The part of a certified way that pins and obstacles go if they cannot go all the way.
 const SHARE: f64 = 0.9;
-/// Pins wait for an iteration after a move that was shortened to less than this. A gap that is nearly closed stops every
-/// move; an iteration without pins may double it.
+/// Pins wait for an iteration after a move that was shortened to less than this. A gap that is nearly closed stops
+/// every move; an iteration without pins may double it.
 const SHORT: f64 = 0.2;
 
 /// The way of all vertices: of pins to their positions at the end of the step, and of the free vertices with them.
