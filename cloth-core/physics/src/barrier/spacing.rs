@@ -29,7 +29,7 @@ pub fn local_thinning(mesh: &CollisionMesh, x: &[Vector3<f64>], thickest: f64) -
     let shortest = mesh.shortest_edges(x);
     let mut kept: Vec<f64> = shortest.into_iter().map(|shortest| thinning(thickest, shortest)).collect();
     // Each sweep carries a grade at least one edge on.
-    while mesh.own_edges().iter().fold(false, |changes, &edge| smooth(&mut kept, edge, x, thickest) || changes) {}
+    while mesh.own_edges().iter().filter(|edge| smooth(&mut kept, **edge, x, thickest)).count() > 0 {}
     kept
 }
 
