@@ -34,7 +34,7 @@ fn uncompensated(source: &str) -> Declaration {
     let start = kinds.iter().filter_map(|kind| source.find(kind)).min().expect("a declaration");
     let source = format!("#[uncompensated]\n{}", &source[start..]);
     let elements = Interpreted::from_source(&source).unwrap_or_else(|e| panic!("{source}\n{e}"));
-    Declaration::clone(&elements[0].declaration())
+    Declaration::clone(elements[0].declaration())
 }
 
 #[test]
