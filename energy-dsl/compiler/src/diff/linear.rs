@@ -48,13 +48,11 @@ impl Front {
         front
     }
 
-    /// Finds the last linear functions of points on all paths to `outputs`; `None` if some are almost
-    /// dependent.
+    /// Finds the last linear functions of points on all paths to `outputs`; `None` if some are almost dependent.
     pub(super) fn of_linear_functions(g: &Graph, outputs: &[NodeId], moving: Moving) -> Option<Self> {
         let mut linear: BTreeMap<NodeId, (usize, Sum)> = BTreeMap::new();
         let mut front = Self::default();
         for node in between(g, outputs) {
-            g.budget().spend(1, 0);
             if let Some(function) = linear_function(g, node, moving, &linear) {
                 linear.insert(node, function);
                 continue;
@@ -136,9 +134,13 @@ fn linear_function(
         return Some((axis, Sum::of(point)));
     }
     let constant = |node| g.as_constant(node).and_then(Weight::of);
+    let paid = |axis: usize, sum: Sum| {
+        g.budget().spend(sum.len(), 0);
+        Some((axis, sum))
+    };
     let scaled = |node, factor: Weight| {
         let (axis, sum): &(usize, Sum) = known.get(&node)?;
-        Some((*axis, sum.times(factor)))
+        paid(*axis, sum.times(factor))
     };
     let added = |a: NodeId, b: NodeId, sign: Weight| {
         if !g.varies(b) {
@@ -148,7 +150,7 @@ fn linear_function(
             return scaled(b, sign);
         }
         let ((axis, a), (other, b)) = (known.get(&a)?, known.get(&b)?);
-        (axis == other).then(|| (*axis, a.plus(sign, b)))
+        if axis == other { paid(*axis, a.plus(sign, b)) } else { None }
     };
     match g.op(node) {
         Op::Neg(a) => scaled(a, Weight::MINUS_ONE),

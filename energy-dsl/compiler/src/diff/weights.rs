@@ -130,6 +130,11 @@ impl Sum {
         self.0.values().fold(0, |sum, weight| (sum + weight.residue) % PRIME) == 0
     }
 
+    /// Returns the number of weights.
+    pub(super) fn len(&self) -> u64 {
+        self.0.len() as u64
+    }
+
     /// Returns the size of the largest weight.
     pub(super) fn largest(&self) -> f64 {
         self.0.values().map(|weight| weight.value.abs()).fold(0.0, f64::max)
