@@ -20,7 +20,7 @@ pub use coordinates::{Coordinates, Moving};
 pub use dihedral::only_dihedral;
 pub use forward::{first_derivatives, second_derivatives};
 pub use local::Order;
-pub use routes::{Routes, SecondOrder, first_order, hessian_vector, second_order};
+pub use routes::{Route, Routes, SecondOrder, first_order, hessian_vector, second_order};
 
 use std::collections::{BTreeMap, BTreeSet};
 

@@ -24,6 +24,8 @@ pub struct SecondOrder {
 pub struct Route {
     /// Name of the route.
     pub name: &'static str,
+    /// The numbers where derivatives are gathered, if they are.
+    pub gathered_at: Option<usize>,
     /// Operations, including those of the value.
     pub count: OperationCount,
     /// Cost according to [`OperationCount::cost`].
@@ -42,6 +44,7 @@ pub struct Routes {
 /// A candidate route.
 struct Alternative {
     name: &'static str,
+    gathered_at: Option<usize>,
     /// Its derivatives.
     nodes: Vec<NodeId>,
     /// Whether it is right everywhere, not only on the ordinary path.
@@ -65,7 +68,8 @@ fn choose(
             None if !alternative.safe => continue,
             None => count(g, &nodes),
         };
-        order.push((number, Route { name: alternative.name, count, cost: count.cost() }));
+        let (name, gathered_at) = (alternative.name, alternative.gathered_at);
+        order.push((number, Route { name, gathered_at, count, cost: count.cost() }));
     }
     order.sort_by_key(|(number, route)| (route.cost, *number));
     let best = &alternatives[order.first().expect("a route exists").0];
@@ -97,7 +101,7 @@ pub fn second_order(
     let forward_hessian = dense(forward::second_derivatives(g, value, coordinates));
     let mut alternatives = Vec::new();
     let mut offer = |name, gradient: &[NodeId], hessian: &[NodeId], safe| {
-        alternatives.push(Alternative { name, nodes: [gradient, hessian].concat(), safe });
+        alternatives.push(Alternative { name, gathered_at: None, nodes: [gradient, hessian].concat(), safe });
     };
     offer("forward over forward", &gradients.forward, &forward_hessian, true);
     if let Some(gradient) = &gradients.reverse {
@@ -119,11 +123,13 @@ pub fn second_order(
             break;
         }
         let Some(found) = cut::derivatives(g, value, &cut, coordinates, &mut by_cut) else { continue };
-        let hessian = dense(found.hessian);
-        match &gradients.apart {
-            Some((gradient, is_safe)) => offer(name, gradient, &hessian, found.safe && *is_safe),
-            None => offer(name, &found.gradient, &hessian, found.safe),
-        }
+        let (gradient, is_safe) = match &gradients.apart {
+            Some((gradient, is_safe)) => (gradient, *is_safe),
+            None => (&found.gradient, true),
+        };
+        let nodes = [&gradient[..], &dense(found.hessian)].concat();
+        let (gathered_at, safe) = (Some(cut.len()), found.safe && is_safe);
+        alternatives.push(Alternative { name, gathered_at, nodes, safe });
     }
     let (mut gradient, routes) = choose(g, routine, &[value], &alternatives);
     let hessian = gradient.split_off(n);
@@ -177,10 +183,10 @@ pub fn hessian_vector(
         })
         .collect();
     // On the general path the product does what ∇²U does.
-    let mut alternatives = vec![Alternative { name: "from the Hessian", nodes: formed, safe: true }];
+    let mut alternatives = vec![Alternative { name: "from the Hessian", gathered_at: None, nodes: formed, safe: true }];
     let safe = adjoint::is_safe(g, &[energy.value], Order::Second, true);
     if let Some(nodes) = adjoint::hessian_vector(g, energy.value, coordinates, &rates) {
-        alternatives.push(Alternative { name: "second-order reverse", nodes, safe });
+        alternatives.push(Alternative { name: "second-order reverse", gathered_at: None, nodes, safe });
     }
     choose(g, routine, &[], &alternatives)
 }
@@ -194,7 +200,7 @@ pub fn first_order(
     known: Option<Vec<NodeId>>,
 ) -> (Vec<Vec<NodeId>>, Routes) {
     let forward = forward::first_derivatives(g, outputs, coordinates, Order::First).concat();
-    let mut alternatives = vec![Alternative { name: "forward", nodes: forward, safe: true }];
+    let mut alternatives = vec![Alternative { name: "forward", gathered_at: None, nodes: forward, safe: true }];
     let safe = adjoint::is_safe(g, outputs, Order::First, true);
     let reverse: Option<Vec<_>> = outputs
         .iter()
@@ -204,11 +210,11 @@ pub fn first_order(
         })
         .collect();
     if let Some(rows) = reverse {
-        alternatives.push(Alternative { name: "reverse", nodes: rows.concat(), safe });
+        alternatives.push(Alternative { name: "reverse", gathered_at: None, nodes: rows.concat(), safe });
     }
     if let Some(nodes) = known {
         // The known derivatives handle the general path themselves.
-        alternatives.push(Alternative { name: "as with second derivatives", nodes, safe: true });
+        alternatives.push(Alternative { name: "as with second derivatives", gathered_at: None, nodes, safe: true });
     }
     let (nodes, routes) = choose(g, routine, outputs, &alternatives);
     let n = coordinates.len();

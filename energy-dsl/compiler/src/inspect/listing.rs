@@ -5,6 +5,7 @@ use proc_macro2::TokenStream;
 use crate::budget::{Budget, Limits, Progress, grouped};
 use crate::check::Program;
 use crate::diagnostic::Diagnostics;
+use crate::diff::Route;
 use crate::emit::emit;
 use crate::graph::{Interpreter, NodeId};
 use crate::inspect::layout::{layout, methods};
@@ -181,7 +182,7 @@ impl Listing {
                     text,
                     "  {:<42} cost {:>5}, {:>4} operations ({} fused, {} divisions and roots, {} transcendental, {} \
                      error terms)  {why}",
-                    route.name,
+                    name_of(route),
                     route.cost,
                     route.count.total(),
                     route.count.fused,
@@ -206,6 +207,15 @@ impl Listing {
         )
         .expect("writing to a string succeeds");
         text
+    }
+}
+
+/// Returns the name of a route, and how many numbers its derivatives are gathered at.
+fn name_of(route: &Route) -> String {
+    match route.gathered_at {
+        None => route.name.to_owned(),
+        Some(1) => format!("{} (1 number)", route.name),
+        Some(count) => format!("{} ({count} numbers)", route.name),
     }
 }
 
