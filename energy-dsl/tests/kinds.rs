@@ -31,6 +31,12 @@ energy! {
         if r < 1 { k * r } else { k * (2 * sqrt(r) - 1) }
     }
 
+    // Its condition tells where a is.
+    energy Sided(a, b: Point; k: Scalar) {
+        let s = norm_squared(b - a);
+        if a.y > 0 { k * s } else { 2 * k * s }
+    }
+
     energy Stretch(x0, x1: Point; rest X0, X1: Point; k: Scalar) {
         rest { let L = norm(X1 - X0); let per_length = 1 / L; }
         k / 2 * per_length * (norm(x1 - x0) - L)^2
@@ -53,6 +59,17 @@ fn functions_are_shared_between_declarations() {
     let declaration = <Chain as Element>::DECLARATION;
     assert!(declaration.translation_invariant);
     assert_eq!(declaration.reduced_coordinates, 6, "two differences of three points");
+}
+
+#[test]
+fn sums_of_points_are_reduced_coordinates() {
+    let midpoint = <Midpoint as Element>::DECLARATION;
+    assert_eq!(midpoint.reduced_coordinates, 3, "one sum of three points");
+    let weights: Vec<&[(usize, f64)]> = midpoint.reduced_vectors.iter().map(|points| &**points).collect();
+    assert_eq!(weights, [[(0, 0.5), (1, 0.5), (2, -1.0)]]);
+    assert!(midpoint.translation_invariant);
+    let sided = <Sided as Element>::DECLARATION;
+    assert!(sided.reduced_coordinates == 3 && !sided.translation_invariant);
 }
 
 #[test]
