@@ -67,8 +67,10 @@ impl Weight {
     pub(super) fn value(self) -> f64 {
         let near = (1..=LARGEST).map(f64::from).find_map(|denominator| {
             let fraction = (self.value * denominator).round() / denominator;
+            // A residue takes long to compute, and few denominators fit.
             let is_near = (fraction - self.value).abs() <= 1e-12 * self.value.abs();
-            Self::fraction(fraction).filter(|fraction| is_near && fraction.residue == self.residue)
+            let fraction = is_near.then(|| Self::fraction(fraction)).flatten();
+            fraction.filter(|fraction| fraction.residue == self.residue)
         });
         near.map_or(self.value, |fraction| fraction.value)
     }

@@ -43,11 +43,11 @@ pub(super) struct Iterate<'a> {
     /// `false` once a term turned out not to be restrictable.
     may_eliminate: bool,
     /// Iterations that still take the secant stiffness of friction.
-    pub(super) secants: u32,
+    secants: u32,
 }
 
 /// Iterations that take the secant stiffness of friction after a step that contact or the line search shortened.
-pub(super) const SECANTS: u32 = 3;
+const SECANTS: u32 = 3;
 
 /// A search direction.
 pub(super) struct Direction {
@@ -272,6 +272,11 @@ impl<'a> Iterate<'a> {
         Ok(solver.solve(downhill, direction, options))
     }
 
+    /// Decides whether the next iterations take the secant stiffness of friction, after a step of this length.
+    pub(super) fn count_secants(&mut self, scale: f64) {
+        self.secants = if scale < 1.0 { SECANTS } else { self.secants.saturating_sub(1) };
+    }
+
     /// How friction enters the Hessian.
     fn sliding(&self) -> SlidingStiffness {
         if self.secants > 0 { SlidingStiffness::Secant } else { SlidingStiffness::Exact }
@@ -324,7 +329,7 @@ impl<'a> Iterate<'a> {
         self.potential.advance(&mut self.x, step.scale, &direction.vectors);
         (self.energy, self.gradient, self.linearised) = (step.energy, step.gradient, step.linearised);
         self.took_full_step = step.scale >= step.allowed;
-        self.secants = if step.scale < 1.0 { SECANTS } else { self.secants.saturating_sub(1) };
+        self.count_secants(step.scale);
         let change = step.scale * direction.length / self.potential.dt;
         let before = std::mem::replace(&mut self.change, change);
         let is_solution = direction.is_projected || direction.solved.converged();

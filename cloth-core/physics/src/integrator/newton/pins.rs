@@ -14,7 +14,7 @@ use energy_solve::{EvaluationError, dot};
 use super::super::projection::Progress;
 use super::super::{StepError, if_finite};
 use super::incremental_potential::IncrementalPotential;
-use super::iterate::{Iterate, SECANTS};
+use super::iterate::Iterate;
 use super::largest;
 
 /// Moves of pins and obstacles within a step, after which they count as blocked.
@@ -70,8 +70,7 @@ impl Iterate<'_> {
         let here = self.potential.whole_gradient(&self.x)?;
         let Some(coupling) = self.potential.change(&self.x, &here, &vectors)? else { return Ok(None) };
         let mut downhill = self.linearise()?;
-        let free = self.potential.body.system.dofs().free().to_vec();
-        for (downhill, &vertex) in downhill.iter_mut().zip(&free) {
+        for (downhill, &vertex) in downhill.iter_mut().zip(self.potential.body.system.dofs().free()) {
             for axis in 0..3 {
                 downhill[axis] -= coupling[vertex][axis];
             }
@@ -83,6 +82,7 @@ impl Iterate<'_> {
             self.projection.demand();
             return Ok(None);
         }
+        let free = self.potential.body.system.dofs().free();
         free.iter().zip(followed).for_each(|(&vertex, vector)| vectors[vertex] = vector);
         let Some(bend) = self.potential.change(&self.x, &here, &vectors)? else { return Ok(None) };
         let (slope, curvature) = (dot(&here, &vectors), dot(&bend, &vectors).max(0.0));
@@ -91,13 +91,18 @@ impl Iterate<'_> {
 
     /// Proceeds after a part of a way.
     fn arrive(&mut self, scale: f64, way: &Way) {
-        self.pins = if scale == 1.0 { 1.0 } else { self.pins + (1.0 - self.pins) * scale };
+        self.pass(scale);
         self.change = scale * largest(&way.vectors) / self.potential.dt;
         self.energy.value += self.potential.update_active_set(&self.x);
         (self.gradient, self.linearised) = (None, None);
         (self.took_full_step, self.pins_wait) = (scale == 1.0, scale < SHORT);
-        self.secants = if scale < 1.0 { SECANTS } else { self.secants.saturating_sub(1) };
+        self.count_secants(scale);
         self.projection.proceed(Progress { is_solution: true, is_whole: scale == 1.0, shrinks: false });
+    }
+
+    /// Records that pins went a part of the rest of their way.
+    fn pass(&mut self, part: f64) {
+        self.pins = if part == 1.0 { 1.0 } else { self.pins + (1.0 - self.pins) * part };
     }
 
     /// Lets pins that contact has stopped move on without the cloth, which has made way.
@@ -110,7 +115,7 @@ impl Iterate<'_> {
         let end = self.potential.along(&self.x, 1.0, &vectors);
         let part = shared(self.potential.filter_step(&self.x, &end));
         self.x = self.potential.along(&self.x, part, &vectors);
-        self.pins = if part == 1.0 { 1.0 } else { self.pins + (1.0 - self.pins) * part };
+        self.pass(part);
         self.potential.update_active_set(&self.x);
         self.energy = self.potential.energy(&self.x)?;
         (self.gradient, self.linearised) = (None, None);
@@ -160,8 +165,7 @@ impl IncrementalPotential<'_> {
         way: &[Vector3<f64>],
     ) -> Result<Option<Vec<Vector3<f64>>>, EvaluationError> {
         let scale = NUDGE / largest(way).max(NUDGE);
-        let nudged: Vec<Vector3<f64>> =
-            x.iter().zip(way).map(|(x, way)| std::array::from_fn(|axis| x[axis] + scale * way[axis])).collect();
+        let nudged = self.along(x, scale, way);
         let Some(there) = if_finite(self.whole_gradient(&nudged))? else { return Ok(None) };
         let difference = |(there, here): (Vector3<f64>, &Vector3<f64>)| -> Vector3<f64> {
             std::array::from_fn(|axis| (there[axis] - here[axis]) / scale)

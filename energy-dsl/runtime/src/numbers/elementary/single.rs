@@ -214,31 +214,31 @@ fn check_all<F: Function>(is_symmetric: bool) {
 }
 
 #[test]
-#[ignore = "takes minutes"]
+#[ignore = "takes minutes: all 32-bit arguments"]
 fn every_sine_is_accurate() {
     check_all::<Sin>(true);
 }
 
 #[test]
-#[ignore = "takes minutes"]
+#[ignore = "takes minutes: all 32-bit arguments"]
 fn every_cosine_is_accurate() {
     check_all::<Cos>(true);
 }
 
 #[test]
-#[ignore = "takes minutes"]
+#[ignore = "takes minutes: all 32-bit arguments"]
 fn every_exponential_is_accurate() {
     check_all::<Exp>(false);
 }
 
 #[test]
-#[ignore = "takes minutes"]
+#[ignore = "takes minutes: all 32-bit arguments"]
 fn every_logarithm_is_accurate() {
     check_all::<Ln>(false);
 }
 
 #[test]
-#[ignore = "takes minutes"]
+#[ignore = "takes minutes: a billion pairs"]
 fn a_billion_pairs_are_accurate() {
     let levels = two_levels();
     check::<Atan2>(&levels, pairs(1 << 28));
