@@ -27,6 +27,10 @@ pub struct Fabric {
     /// texture coordinate of the OBJ file grows. Default [1, 0, 0].
     #[serde(default = "first_axis", with = "WarpChoice")]
     pub warp: Warp,
+    /// Where the membrane takes its strain: `nodal` (the default), which lets stiff cloth fold on any mesh, or
+    /// `per-triangle`.
+    #[serde(default)]
+    pub strain: Strain,
     /// Limits the stretch of the threads. Default none.
     #[serde(default)]
     pub strain_limit: Option<StrainLimit>,
@@ -48,6 +52,7 @@ impl Fabric {
             friction: 0.0,
             material,
             warp: first_axis(),
+            strain: Strain::default(),
             strain_limit: None,
             rayleigh: None,
             plasticity: None,
@@ -66,6 +71,19 @@ const BULK_DENSITY: f64 = 470.0;
 
 fn first_axis() -> Warp {
     Warp::Direction([1.0, 0.0, 0.0])
+}
+
+/// Where a membrane of triangles takes its strain.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Strain {
+    /// The mean over the triangles around each vertex, beside a part of the stiffness that each triangle has on its
+    /// own. Linear triangles alone lock: on an irregular mesh a stiff cloth cannot fold. Fabrics so soft, or meshes so
+    /// fine, that triangles do not lock have plain triangles. Springs and elements of your own have no mean.
+    #[default]
+    Nodal,
+    /// Each triangle has its own.
+    PerTriangle,
 }
 
 /// Strain limit of triangles: energy A k/3 (o_u³ + o_v³), where o is the excess stretch of warp and weft.

@@ -6,6 +6,8 @@ mod description;
 mod error;
 mod hair;
 mod library;
+mod locking;
+mod nodal;
 mod plasticity;
 pub mod plate;
 mod terms;
@@ -14,7 +16,8 @@ mod warp_choice;
 pub use damping::StitchDamping;
 pub use declared::{Declared, DeclaredError};
 pub use description::{
-    Arap, BaraffWitkin, Bending, Fabric, MassSpring, Material, Membrane, Plasticity, Rayleigh, StrainLimit, Woven,
+    Arap, BaraffWitkin, Bending, Fabric, MassSpring, Material, Membrane, Plasticity, Rayleigh, Strain, StrainLimit,
+    Woven,
 };
 pub use error::FabricError;
 pub use hair::{Hair, hair_terms};

@@ -12,8 +12,8 @@ use energy_solve::{DrivenLaw, Stencils};
 use crate::geometry::{cross, dot, norm, subtract};
 use crate::mesh::{Hinge, MaterialTriangle, TriangleMesh, dihedral_angle};
 
-/// Creates the element of a triangle at rest.
-pub(super) type MembraneElement<E> = Box<dyn Fn(MaterialTriangle) -> Result<E, RestError> + Send + Sync>;
+/// Creates the element of a triangle, given its index and its rest shape.
+pub(super) type MembraneElement<E> = Box<dyn Fn(usize, MaterialTriangle) -> Result<E, RestError> + Send + Sync>;
 
 /// Membrane triangles that yield where a principal stretch exceeds a limit.
 pub(super) struct PlasticMembrane<E> {
@@ -49,7 +49,7 @@ impl<E: PackedPotential<f64> + fmt::Debug + Send + Sync + 'static> DrivenLaw for
             let corners = [0, 1, 2].map(|point| x[stencils.vertex(triangle, point) as usize]);
             let Some(rest) = flowed(self.rest[triangle], corners, self.limit) else { continue };
             // A rest shape that the element refuses is not taken.
-            if let Ok(element) = (self.element)(rest) {
+            if let Ok(element) = (self.element)(triangle, rest) {
                 (self.rest[triangle], self.elements[triangle]) = (rest, element);
                 flows = true;
             }
@@ -62,9 +62,10 @@ impl<E: PackedPotential<f64> + fmt::Debug + Send + Sync + 'static> DrivenLaw for
     }
 
     fn restore(&mut self, history: &[f64]) {
-        for ((rest, element), numbers) in self.rest.iter_mut().zip(&mut self.elements).zip(history.chunks_exact(6)) {
+        let all = self.rest.iter_mut().zip(&mut self.elements).zip(history.chunks_exact(6));
+        for (triangle, ((rest, element), numbers)) in all.enumerate() {
             let saved = [[numbers[0], numbers[1]], [numbers[2], numbers[3]], [numbers[4], numbers[5]]];
-            if let Ok(restored) = (self.element)(saved) {
+            if let Ok(restored) = (self.element)(triangle, saved) {
                 (*rest, *element) = (saved, restored);
             }
         }
@@ -72,7 +73,7 @@ impl<E: PackedPotential<f64> + fmt::Debug + Send + Sync + 'static> DrivenLaw for
 }
 
 /// Returns the rest shape that a triangle flows to; `None` if no principal stretch exceeds the limit.
-fn flowed(rest: MaterialTriangle, [a, b, c]: [Vector3<f64>; 3], limit: f64) -> Option<MaterialTriangle> {
+pub(super) fn flowed(rest: MaterialTriangle, [a, b, c]: [Vector3<f64>; 3], limit: f64) -> Option<MaterialTriangle> {
     let [u, v] = [1, 2].map(|corner| [0, 1].map(|axis| rest[corner][axis] - rest[0][axis]));
     let determinant = u[0] * v[1] - v[0] * u[1];
     let (base, side) = (subtract(b, a), subtract(c, a));

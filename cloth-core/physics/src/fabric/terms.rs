@@ -9,9 +9,11 @@ use energy_solve::{DissipationTerm, DrivenTerm, ElementList, ForceTerm, ListErro
 use super::damping::{HingeDamping, MembraneDamping};
 use super::declared::{Declared, TargetMesh};
 use super::error::FabricError;
+use super::locking::Folds;
+use super::nodal::{self, NodalMembrane, RestShapes};
 use super::plasticity::{PlasticHinges, PlasticMembrane, angle_of_curvature};
 use super::plate::{PlateTerm, Rigidity, ThreadError};
-use super::{Bending, Fabric, MassSpring, Material, Plasticity, Rayleigh, StrainLimit};
+use super::{Bending, Fabric, MassSpring, Material, Plasticity, Rayleigh, Strain, StrainLimit};
 use crate::geometry::{cross, norm, subtract};
 use crate::mesh::{
     Hinge, MaterialTriangle, SpringNetwork, Topology, TriangleMesh, Warp, lumped_masses, material_triangle, rest_angle,
@@ -76,7 +78,9 @@ pub fn terms_at(
     let masses = lumped_masses(mesh, fabric.density);
     let mut terms = FabricTerms::new(masses, part);
     let plasticity = fabric.plasticity.unwrap_or_default();
-    let cloth = MaterialMesh { mesh, triangles: material_triangles(mesh, fabric)?, warp: fabric.warp, plasticity };
+    let (triangles, is_woven) = material_triangles(mesh, fabric)?;
+    let folds = folds(fabric, surroundings)?;
+    let cloth = MaterialMesh { mesh, triangles, is_woven, warp: fabric.warp, plasticity, folds };
     check_plasticity(fabric)?;
     // λ and μ for small strains; damping is proportional to them.
     let (stiffness, bending) = match &fabric.material {
@@ -146,8 +150,28 @@ pub fn terms_at(
 struct MaterialMesh<'a> {
     mesh: &'a TriangleMesh,
     triangles: Vec<MaterialTriangle>,
+    /// Whether the first axis of each triangle is its warp.
+    is_woven: bool,
     warp: Warp,
     plasticity: Plasticity,
+    /// The folds that the membrane must not lock; `None` for plain triangles.
+    folds: Option<Folds>,
+}
+
+/// Returns the folds that the membrane must not lock; `None` for plain triangles.
+fn folds(fabric: &Fabric, surroundings: &Surroundings) -> Result<Option<Folds>, FabricError> {
+    let bending = match &fabric.material {
+        _ if fabric.strain == Strain::PerTriangle => return Ok(None),
+        Material::MassSpring(_) | Material::File(_) => return Ok(None),
+        Material::Stvk(material) | Material::NeoHookean(material) => &material.bending,
+        Material::StableNeoHookean(material) | Material::StableNeoHookeanLog(material) => &material.bending,
+        Material::Arap(material) => &material.bending,
+        Material::BaraffWitkin(material) => &material.bending,
+        Material::OrthotropicStvk(material) => &material.bending,
+    };
+    // Folds without gravity are judged as if there were some.
+    let gravity = Some(norm(surroundings.gravity)).filter(|&gravity| gravity > 0.0).unwrap_or(9.81);
+    Ok(Some(Folds { rigidity: rigidity_along_grid(bending)?, weight: gravity * fabric.density }))
 }
 
 /// Returns an error if something would have to yield that cannot.
@@ -167,15 +191,18 @@ fn check_plasticity(fabric: &Fabric) -> Result<(), FabricError> {
     if curvature.is_some() && !can_fold { Err(FabricError::CannotFold) } else { Ok(()) }
 }
 
-/// Maps every triangle to its plane; with the first axis along the warp if the fabric depends on it.
-fn material_triangles(mesh: &TriangleMesh, fabric: &Fabric) -> Result<Vec<MaterialTriangle>, ThreadError> {
+/// Maps every triangle to its plane; with the first axis along the warp if the fabric depends on it. Returns whether it
+/// does.
+fn material_triangles(mesh: &TriangleMesh, fabric: &Fabric) -> Result<(Vec<MaterialTriangle>, bool), ThreadError> {
     let woven = matches!(fabric.material, Material::BaraffWitkin(_) | Material::OrthotropicStvk(_) | Material::File(_));
     let all = 0..mesh.triangles().len();
     if !woven && fabric.strain_limit.is_none() {
-        return Ok(all.map(|triangle| material_triangle(mesh.corners(triangle))).collect());
+        return Ok((all.map(|triangle| material_triangle(mesh.corners(triangle))).collect(), false));
     }
     let warp = fabric.warp;
-    all.map(|triangle| mesh.thread_triangle(triangle, warp).ok_or(ThreadError { triangle, warp })).collect()
+    let triangles: Result<_, _> =
+        all.map(|triangle| mesh.thread_triangle(triangle, warp).ok_or(ThreadError { triangle, warp })).collect();
+    triangles.map(|triangles| (triangles, true))
 }
 
 pub(super) fn area([a, b, c]: MaterialTriangle) -> f64 {
@@ -244,6 +271,7 @@ impl FabricTerms {
         Ok(())
     }
 
+    /// Adds triangles, or nodal averages beside triangles as stiff as they can be without locking.
     fn add_membrane<E>(
         &mut self,
         name: &str,
@@ -257,6 +285,33 @@ impl FabricTerms {
         if self.leave_out(name, is_zero, cloth.triangles.len()) {
             return Ok(());
         }
+        let Some(folds) = cloth.folds else { return self.add_triangles(name, cloth, move |_, rest| element(rest)) };
+        let at_rest = |source| FabricError::Rest { triangle: 0, source };
+        let shapes = RestShapes::new(cloth.mesh, &cloth.triangles, cloth.is_woven);
+        let Some(plain) = nodal::plain_moduli(&shapes, folds, &element).map_err(at_rest)? else {
+            return self.add_triangles(name, cloth, move |_, rest| element(rest));
+        };
+        let of_triangles = shapes.means_of_corners(&plain);
+        self.add_triangles(name, cloth, move |triangle, [u0, u1, u2]| {
+            let [[c_uu, c_uv, _], [_, c_vv, _], [_, _, c_ss]] = of_triangles[triangle];
+            OrthotropicStVK::new(u0, u1, u2, c_uu - c_uv, c_vv - c_uv, c_uv, c_ss)
+        })?;
+        let (name, limit) = (self.named(&format!("nodal {name}")), cloth.plasticity.stretch);
+        let term = NodalMembrane::new(name, self.part.first, shapes, plain, element, limit).map_err(at_rest)?;
+        self.terms.push(Box::new(term));
+        Ok(())
+    }
+
+    /// Adds an element for each triangle.
+    fn add_triangles<E>(
+        &mut self,
+        name: &str,
+        cloth: &MaterialMesh<'_>,
+        element: impl Fn(usize, MaterialTriangle) -> Result<E, RestError> + Send + Sync + 'static,
+    ) -> Result<(), FabricError>
+    where
+        E: PackedPotential<f64> + std::fmt::Debug + Send + Sync + 'static,
+    {
         let elements = elements(cloth, &element)?;
         let Some(limit) = cloth.plasticity.stretch else {
             return self.add_potential(name, cloth.mesh.triangles(), elements);
@@ -482,10 +537,10 @@ fn rigidity_along_grid(bending: &Bending) -> Result<f64, FabricError> {
 /// Creates an element for each triangle.
 fn elements<E>(
     cloth: &MaterialMesh<'_>,
-    element: impl Fn(MaterialTriangle) -> Result<E, RestError>,
+    element: impl Fn(usize, MaterialTriangle) -> Result<E, RestError>,
 ) -> Result<Vec<E>, FabricError> {
     let one = |(triangle, material_triangles): (usize, &MaterialTriangle)| {
-        element(*material_triangles).map_err(|source| FabricError::Rest { triangle, source })
+        element(triangle, *material_triangles).map_err(|source| FabricError::Rest { triangle, source })
     };
     cloth.triangles.iter().enumerate().map(one).collect()
 }

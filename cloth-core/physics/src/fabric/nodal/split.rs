@@ -1,0 +1,44 @@
+//! How the stiffness of a membrane is divided between plain triangles and nodal averages.
+
+use energy_dsl::{PackedPotential, RestError};
+
+use super::law::{Order, StrainLaw, TriangleLaw};
+use super::term::{Moduli, RestShapes};
+use crate::fabric::locking::Folds;
+use crate::mesh::MaterialTriangle;
+
+/// Returns C_v of each fan: the moduli at rest, with eigenvalues cut to what plain triangles carry without locking.
+/// `None` if nothing was cut, so that plain triangles serve as well.
+pub(in super::super) fn plain_moduli<E: PackedPotential<f64> + std::fmt::Debug + Send + Sync + 'static>(
+    shapes: &RestShapes<'_>,
+    folds: Folds,
+    element: &dyn Fn(MaterialTriangle) -> Result<E, RestError>,
+) -> Result<Option<Vec<Moduli>>, RestError> {
+    let law = TriangleLaw::new(&[1.0], element)?;
+    let moduli = law.respond(&[[0.0; 3]], Order::Hessian).0[0].moduli;
+    let mut is_cut = false;
+    let cut = |edge: f64| {
+        let (cut, changed) = cut(&moduli, folds.plain_stiffness(edge));
+        is_cut |= changed;
+        cut
+    };
+    let plain: Vec<Moduli> = shapes.edge_lengths().into_iter().map(cut).collect();
+    Ok(is_cut.then_some(plain))
+}
+
+/// Cuts the eigenvalues of moduli to at most `largest`, in N/m, and drops negative ones. Returns whether any was cut.
+///
+/// Eigenvalues refer to the strain (E_uu, E_vv, √2 E_uv), which turns with the frame like a vector. Couplings of stretch
+/// with shear are dropped.
+fn cut(moduli: &Moduli, largest: f64) -> (Moduli, bool) {
+    let [[a, b, _], [_, d, _], [_, _, shear]] = *moduli;
+    let (middle, radius) = (0.5 * (a + d), (0.5 * (a - d)).hypot(b));
+    let [upper, lower] = [middle + radius, middle - radius].map(|value| value.clamp(0.0, largest));
+    // The projections onto the eigenvectors are ½ (1 ± N), where N is the traceless part over its radius.
+    let (mean, half) = (0.5 * (upper + lower), 0.5 * (upper - lower));
+    let per_radius = if radius > 0.0 { half / radius } else { 0.0 };
+    let (across, coupling) = (0.5 * (a - d) * per_radius, b * per_radius);
+    let cut =
+        [[mean + across, coupling, 0.0], [coupling, mean - across, 0.0], [0.0, 0.0, shear.clamp(0.0, 0.5 * largest)]];
+    (cut, middle + radius > largest || shear > 0.5 * largest)
+}

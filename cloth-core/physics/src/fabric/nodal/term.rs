@@ -1,0 +1,317 @@
+use std::fmt;
+use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
+
+use energy_dsl::{Declaration, PackedPotential, RestError, Vector3};
+use energy_solve::{
+    Blocks, Character, DofMap, Linearisation, Pattern, PlacedTerm, Quantity, Restriction, State, Stencils, Storage,
+    Tally, Term, TermDescription, index,
+};
+
+use super::assembly::{Assembly, PatchSlots};
+use super::fan::{Fan, fans};
+use super::law::{Order, Response, Strain, StrainLaw, TriangleLaw};
+use super::patch::Patch;
+use crate::fabric::plasticity::flowed;
+use crate::geometry::dot;
+use crate::mesh::{MaterialTriangle, TriangleMesh};
+
+/// The law of patches with these areas, in m².
+type LawOfAreas = Box<dyn Fn(&[f64]) -> Result<Box<dyn StrainLaw>, RestError> + Send + Sync>;
+
+/// Moduli by strain (E_uu, E_vv, 2 E_uv), in N/m.
+pub(in super::super) type Moduli = [[f64; 3]; 3];
+
+/// Σ A_v (W(Ē_v) − ½ Ē_v : C_v : Ē_v) over the vertices of a mesh; see the [module](super).
+#[derive(Debug)]
+pub(in super::super) struct NodalMembrane {
+    name: String,
+    law: Box<dyn StrainLaw>,
+    /// C_v, which plain triangles carry.
+    plain: Vec<Moduli>,
+    pub(super) patches: Vec<Patch>,
+    /// Vertices of the patches, padded to the same number by repeating the first.
+    stencils: Vec<u32>,
+    arity: usize,
+    /// Patches with a free vertex, and the slots of their blocks; set by [`Term::place`].
+    pub(super) active: Vec<usize>,
+    pub(super) slots: Vec<PatchSlots>,
+    /// How rest shapes yield; `None` if they do not.
+    flow: Option<Flow>,
+    /// U where forces or Jacobians were last evaluated, as bits.
+    found: AtomicU64,
+}
+
+/// A mesh at rest, divided into fans.
+pub(in super::super) struct RestShapes<'a> {
+    mesh: &'a TriangleMesh,
+    rest: &'a [MaterialTriangle],
+    fans: Vec<Fan>,
+}
+
+/// Triangles that yield where a principal stretch exceeds a limit.
+struct Flow {
+    triangles: Vec<[usize; 3]>,
+    rest: Vec<MaterialTriangle>,
+    fans: Vec<Fan>,
+    law: LawOfAreas,
+    limit: f64,
+}
+
+impl fmt::Debug for Flow {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Flow").field("limit", &self.limit).finish_non_exhaustive()
+    }
+}
+
+impl<'a> RestShapes<'a> {
+    /// Divides a mesh into fans. Woven triangles have their first axis along the warp.
+    pub fn new(mesh: &'a TriangleMesh, rest: &'a [MaterialTriangle], is_woven: bool) -> Self {
+        Self { mesh, rest, fans: fans(mesh, rest, is_woven) }
+    }
+
+    /// Returns one number per fan: a mean over the sides of its triangles of their length in m.
+    pub fn edge_lengths(&self) -> Vec<f64> {
+        let perimeter = |plane: MaterialTriangle| -> f64 {
+            (0..3)
+                .map(|k| (0..2).map(|axis| (plane[(k + 1) % 3][axis] - plane[k][axis]).powi(2)).sum::<f64>().sqrt())
+                .sum()
+        };
+        let mean = |fan: &Fan| {
+            let sum: f64 = fan.iter().map(|corner| perimeter(self.rest[corner.triangle])).sum();
+            sum / (3 * fan.len()) as f64
+        };
+        self.fans.iter().map(mean).collect()
+    }
+
+    /// Returns the mean over the corners of each triangle of a matrix per fan.
+    pub fn means_of_corners(&self, of_fans: &[Moduli]) -> Vec<Moduli> {
+        let mut means = vec![[[0.0; 3]; 3]; self.mesh.triangles().len()];
+        for (fan, moduli) in self.fans.iter().zip(of_fans) {
+            for corner in fan {
+                let mean = means[corner.triangle].as_flattened_mut();
+                mean.iter_mut().zip(moduli.as_flattened()).for_each(|(sum, entry)| *sum += entry / 3.0);
+            }
+        }
+        means
+    }
+}
+
+impl NodalMembrane {
+    /// Creates the term. `plain` holds C_v per fan; triangles that stretch beyond `limit` yield.
+    pub fn new<E: PackedPotential<f64> + fmt::Debug + Send + Sync + 'static>(
+        name: String,
+        first: usize,
+        shapes: RestShapes<'_>,
+        plain: Vec<Moduli>,
+        element: impl Fn(MaterialTriangle) -> Result<E, RestError> + Send + Sync + 'static,
+        limit: Option<f64>,
+    ) -> Result<Self, RestError> {
+        let law: LawOfAreas = Box::new(move |areas| Ok(Box::new(TriangleLaw::new(areas, &element)?)));
+        let RestShapes { mesh, rest, fans } = shapes;
+        let patch = |fan: &Fan| Patch::new(fan, mesh.triangles(), rest).on_vertices_from(first);
+        let patches: Vec<Patch> = fans.iter().map(patch).collect();
+        let triangles = mesh.triangles().iter().map(|corners| corners.map(|vertex| first + vertex)).collect();
+        let areas: Vec<f64> = patches.iter().map(|patch| patch.area).collect();
+        let arity = patches.iter().map(|patch| patch.vertices.len()).max().unwrap_or(1);
+        let padded = |patch: &Patch| {
+            let filled = std::iter::repeat_n(patch.vertices[0], arity - patch.vertices.len());
+            patch.vertices.clone().into_iter().chain(filled).map(index)
+        };
+        Ok(Self {
+            name,
+            stencils: patches.iter().flat_map(padded).collect(),
+            arity,
+            plain,
+            active: Vec::new(),
+            slots: Vec::new(),
+            found: AtomicU64::default(),
+            patches,
+            law: law(&areas)?,
+            flow: limit.map(|limit| Flow { triangles, rest: rest.to_vec(), fans, law, limit }),
+        })
+    }
+
+    fn tally(&self, flagged: u64) -> Tally {
+        let evaluated = self.active.len() as u64;
+        Tally { evaluated, skipped: self.patches.len() as u64 - evaluated, flagged, projected: 0 }
+    }
+
+    /// Evaluates the patches with a free vertex: A_v (W(Ē) − ½ Ē : C_v : Ē) and its derivatives by Ē.
+    fn responses(&self, x: &[Vector3<f64>], order: Order) -> (Vec<Response>, u64) {
+        let (mut differences, active) = (Vec::new(), self.active.iter().map(|&patch| &self.patches[patch]));
+        let strains: Vec<Strain> = active.map(|patch| patch.strain(x, &mut differences)).collect();
+        let (mut all, flagged) = self.law.respond(&strains, order);
+        for ((response, strain), &patch) in all.iter_mut().zip(&strains).zip(&self.active) {
+            for i in 0..3 {
+                let moduli = self.plain[patch][i].map(|entry| self.patches[patch].area * entry);
+                let stress = dot(moduli, *strain);
+                response.energy -= 0.5 * stress * strain[i];
+                response.stress[i] -= stress;
+                (0..3).for_each(|j| response.moduli[i][j] -= moduli[j]);
+            }
+        }
+        (all, flagged)
+    }
+
+    /// Evaluates all patches, and notes U.
+    fn linearised(&self, x: &[Vector3<f64>], order: Order) -> (Vec<Response>, u64) {
+        let (responses, flagged) = self.responses(x, order);
+        let energy: f64 = responses.iter().map(|response| response.energy).sum();
+        self.found.store(energy.to_bits(), Relaxed);
+        (responses, flagged)
+    }
+
+    /// Takes the rest shapes of the flow.
+    fn fit(&mut self) {
+        let Some(flow) = &self.flow else { return };
+        for (patch, fan) in self.patches.iter_mut().zip(&flow.fans) {
+            patch.fit(fan, &flow.triangles, &flow.rest);
+        }
+        let areas: Vec<f64> = self.active.iter().map(|&patch| self.patches[patch].area).collect();
+        // Rest shapes that the elements refuse are not taken.
+        if let Ok(law) = (flow.law)(&areas) {
+            self.law = law;
+        }
+    }
+}
+
+impl TermDescription for NodalMembrane {
+    fn name(&self) -> &str {
+        &self.name
+    }
+
+    fn declaration(&self) -> &Declaration {
+        self.law.declaration()
+    }
+
+    fn character(&self) -> Character {
+        Character { symmetric: true, velocity_dependent: false, quadratic: false, curved: true }
+    }
+
+    fn stencils(&self) -> Stencils<'_> {
+        Stencils::new(self.arity, &self.stencils)
+    }
+}
+
+impl Term for NodalMembrane {
+    fn place(mut self: Box<Self>, dofs: &DofMap, pattern: &Pattern) -> Box<dyn PlacedTerm> {
+        let is_free = |&vertex: &usize| dofs.row(vertex).is_some();
+        self.active =
+            (0..self.patches.len()).filter(|&patch| self.patches[patch].vertices.iter().any(is_free)).collect();
+        self.law = self.law.selected(&self.active);
+        let slot = |i: usize, j: usize| {
+            let rows = dofs.row(i).zip(dofs.row(j));
+            index(rows.and_then(|(row, column)| pattern.slot(row, column)).map_or(pattern.nowhere(), |(slot, _)| slot))
+        };
+        let slots = |&patch: &usize| {
+            let vertices = &self.patches[patch].vertices;
+            let pairs =
+                || (0..vertices.len()).flat_map(|i| (i..vertices.len()).map(move |j| (vertices[i], vertices[j])));
+            // Vertices ascend, and so do their rows: no block of the upper triangle needs transposing.
+            PatchSlots {
+                slots: pairs().map(|(i, j)| slot(i, j)).collect(),
+                mirrored: match pattern.storage() {
+                    Storage::Upper => Vec::new(),
+                    Storage::Whole => pairs().map(|(i, j)| slot(j, i)).collect(),
+                },
+            }
+        };
+        self.slots = self.active.iter().map(slots).collect();
+        self
+    }
+}
+
+impl PlacedTerm for NodalMembrane {
+    fn restricted(&self, restriction: &Restriction<'_>) -> Option<Box<dyn PlacedTerm>> {
+        let numbers = restriction.remaining(self.active.iter().copied(), self.stencils());
+        let chosen = || numbers.iter().map(|&number| self.active[number]);
+        let of = self.stencils();
+        Some(Box::new(Self {
+            name: self.name.clone(),
+            law: self.law.selected(&numbers),
+            plain: chosen().map(|patch| self.plain[patch]).collect(),
+            patches: chosen().map(|patch| self.patches[patch].clone()).collect(),
+            stencils: chosen().flat_map(|patch| of.stencil(patch)).collect(),
+            arity: self.arity,
+            active: (0..numbers.len()).collect(),
+            slots: numbers.iter().map(|&number| self.slots[number].restricted(restriction)).collect(),
+            flow: None,
+            found: AtomicU64::default(),
+        }))
+    }
+
+    fn has_energy(&self) -> bool {
+        true
+    }
+
+    fn energy(&self, x: &[Vector3<f64>]) -> Option<(f64, Tally)> {
+        let (responses, flagged) = self.responses(x, Order::Value);
+        Some((responses.iter().map(|response| response.energy).sum(), self.tally(flagged)))
+    }
+
+    fn end_step(&mut self, end: State<'_>) {
+        let Some(flow) = &mut self.flow else { return };
+        let mut flows = false;
+        for (rest, corners) in flow.rest.iter_mut().zip(&flow.triangles) {
+            if let Some(moved) = flowed(*rest, corners.map(|vertex| end.x[vertex]), flow.limit) {
+                (*rest, flows) = (moved, true);
+            }
+        }
+        if flows {
+            self.fit();
+        }
+    }
+
+    fn is_driven(&self) -> bool {
+        self.flow.is_some()
+    }
+
+    fn history(&self) -> Vec<f64> {
+        self.flow.as_ref().map_or_else(Vec::new, |flow| flow.rest.as_flattened().as_flattened().to_vec())
+    }
+
+    fn restore_history(&mut self, history: &[f64]) {
+        let Some(flow) = &mut self.flow else { return };
+        let numbers = flow.rest.as_flattened_mut().as_flattened_mut();
+        if history.len() == numbers.len() {
+            numbers.copy_from_slice(history);
+            self.fit();
+        }
+    }
+
+    fn energy_found(&self) -> Option<f64> {
+        Some(f64::from_bits(self.found.load(Relaxed)))
+    }
+
+    fn element_energies(&self, x: &[Vector3<f64>]) -> Option<Vec<(usize, f64)>> {
+        let energies = self.responses(x, Order::Value).0.into_iter().map(|response| response.energy);
+        Some(self.active.iter().copied().zip(energies).collect())
+    }
+
+    fn add_force(&self, state: State<'_>, force: &mut [Vector3<f64>]) -> Tally {
+        let (responses, flagged) = self.linearised(state.x, Order::Gradient);
+        Assembly { of: self, responses: &responses, x: state.x }.subtract_gradient(force);
+        self.tally(flagged)
+    }
+
+    fn add_linearisation(&self, state: State<'_>, sum: &mut Linearisation<'_>) -> Tally {
+        let (responses, flagged) = self.linearised(state.x, Order::Hessian);
+        let assembly = Assembly { of: self, responses: &responses, x: state.x };
+        assembly.subtract_gradient(sum.force);
+        if let Some(product) = &mut sum.stiffness_times_velocity {
+            assembly.subtract_product(state.v, product);
+        }
+        let (scale, curvature) = (-sum.weights.position, sum.curvature);
+        match &mut sum.matrix {
+            Blocks::Single(matrix) => assembly.add_hessian(scale, curvature, matrix),
+            Blocks::Double(matrix) => assembly.add_hessian(scale, curvature, matrix),
+        }
+        self.tally(flagged)
+    }
+
+    fn find_non_finite(&self, _: Quantity, state: State<'_>) -> Option<usize> {
+        let (responses, _) = self.responses(state.x, Order::Gradient);
+        let is_finite = |response: &Response| (response.energy + response.stress.iter().sum::<f64>()).is_finite();
+        self.active.iter().zip(&responses).find(|(_, response)| !is_finite(response)).map(|(&patch, _)| patch)
+    }
+}

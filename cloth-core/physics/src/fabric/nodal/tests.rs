@@ -1,0 +1,113 @@
+use energy_dsl::Vector3;
+use energy_solve::{BlockMatrix, Curvature, LinearisationOptions, State, System, Weights};
+
+use crate::fabric::{
+    Arap, BaraffWitkin, Bending, Fabric, Material, Membrane, Rigidity, Strain, Surroundings, Woven, terms,
+};
+use crate::mesh::{Diagonals, Plane, Sheet, SpringNetwork, TriangleMesh};
+
+const NOTHING: Surroundings = Surroundings { gravity: [0.0; 3], drag: 0.0 };
+
+/// A sheet of one square metre whose inner vertices are shifted at random.
+fn irregular(cells: usize, seed: u64) -> TriangleMesh {
+    let (diagonals, plane) = (Diagonals::Regular, Plane::Horizontal);
+    let mesh = Sheet { cells: [cells; 2], size: [1.0; 2], diagonals, plane, pleats: None }.mesh().unwrap();
+    let mut random = fastrand::Rng::with_seed(seed);
+    let mut shift = |at: f64| if at.abs() < 0.49 { at + 0.4 * (random.f64() - 0.5) / cells as f64 } else { at };
+    let vertices = mesh.vertices().iter().map(|&[x, y, z]| [shift(x), shift(y), z]).collect();
+    TriangleMesh::new(vertices, mesh.triangles().to_vec()).unwrap()
+}
+
+/// Membranes of every kind, of 100 to 2,000 N/m, with almost no plate.
+fn materials() -> Vec<Material> {
+    let bending = Bending::Plate(Rigidity::Flexural { rigidity: 1e-9, poisson_ratio: 0.0 });
+    let isotropic = || Membrane { stretch_stiffness: 1e3, poisson_ratio: 0.3, bending };
+    vec![
+        Material::Stvk(isotropic()),
+        Material::NeoHookean(isotropic()),
+        Material::StableNeoHookean(isotropic()),
+        Material::StableNeoHookeanLog(isotropic()),
+        Material::Arap(Arap { stretch_stiffness: 1e3, bending }),
+        Material::OrthotropicStvk(Woven { warp: 2e3, weft: 700.0, bias: 100.0, poisson_ratio: 0.2, bending }),
+        Material::BaraffWitkin(BaraffWitkin { stretch: 1e3, shear: 100.0, rest_stretch: [1.0; 2], bending }),
+    ]
+}
+
+fn system(mesh: &TriangleMesh, material: Material, strain: Strain) -> System {
+    let fabric = Fabric { strain, warp: [0.8, 0.6, 0.0].into(), ..Fabric::new(0.1, material) };
+    let garment = terms(&fabric, mesh, &SpringNetwork::default(), &NOTHING).unwrap();
+    System::new(garment.terms, &vec![false; mesh.vertices().len()]).unwrap()
+}
+
+fn energy(system: &mut System, x: &[Vector3<f64>]) -> f64 {
+    system.energies(x).unwrap().iter().filter_map(|term| term.energy).sum()
+}
+
+fn linearised(system: &mut System, x: &[Vector3<f64>], curvature: Curvature) -> (Vec<Vector3<f64>>, BlockMatrix) {
+    let still = vec![[0.0; 3]; x.len()];
+    let mut matrix = system.matrix();
+    let options = LinearisationOptions::new(Weights { position: -1.0, velocity: 0.0 }, curvature);
+    let force = system.linearise(State { x, v: &still }, options, &mut matrix).unwrap().force.to_vec();
+    (force, matrix)
+}
+
+/// Moves each vertex at random, after a rotation that leads out of the plane.
+fn deformed(mesh: &TriangleMesh, size: f64, seed: u64) -> Vec<Vector3<f64>> {
+    let mut random = fastrand::Rng::with_seed(seed);
+    let turned =
+        |&[x, y, z]: &Vector3<f64>| [0.8 * x - 0.6 * z, 0.48 * x + 0.6 * y + 0.64 * z, 0.36 * x - 0.8 * y + 0.48 * z];
+    mesh.vertices().iter().map(|x| turned(x).map(|component| component + size * (random.f64() - 0.5))).collect()
+}
+
+#[test]
+fn constant_strain_has_the_energy_of_plain_triangles() {
+    let mesh = irregular(6, 1);
+    let affine = |&[u, v, _]: &Vector3<f64>| [1.1 * u + 0.05 * v, 0.02 * u + 0.9 * v, 0.3 * u - 0.2 * v];
+    let x: Vec<Vector3<f64>> = mesh.vertices().iter().map(affine).collect();
+    for material in materials() {
+        let [nodal, plain] = [Strain::Nodal, Strain::PerTriangle].map(|strain| {
+            let mut system = system(&mesh, material.clone(), strain);
+            (energy(&mut system, &x), linearised(&mut system, &x, Curvature::Exact).0)
+        });
+        assert!((nodal.0 / plain.0 - 1.0).abs() < 1e-12, "{material:?}: {} for {}", nodal.0, plain.0);
+        let largest = plain.1.as_flattened().iter().fold(0.0_f64, |largest, f| largest.max(f.abs()));
+        for (a, b) in nodal.1.as_flattened().iter().zip(plain.1.as_flattened()) {
+            assert!((a - b).abs() < 1e-12 * largest, "{material:?}: {a} for {b}");
+        }
+    }
+}
+
+#[test]
+fn derivatives_are_those_of_the_energy() {
+    let mesh = irregular(4, 2);
+    for (number, material) in materials().into_iter().enumerate() {
+        let mut system = system(&mesh, material.clone(), Strain::Nodal);
+        let x = deformed(&mesh, 0.05, number as u64);
+        let (force, matrix) = linearised(&mut system, &x, Curvature::Exact);
+        let scale = force.as_flattened().iter().fold(0.0_f64, |largest, f| largest.max(f.abs()));
+        let mut random = fastrand::Rng::with_seed(7);
+        for _ in 0..4 {
+            let direction: Vec<Vector3<f64>> = x.iter().map(|_| [0; 3].map(|_: i32| random.f64() - 0.5)).collect();
+            let moved = |by: f64| -> Vec<Vector3<f64>> {
+                let one = |(x, d): (&Vector3<f64>, &Vector3<f64>)| std::array::from_fn(|axis| x[axis] + by * d[axis]);
+                x.iter().zip(&direction).map(one).collect()
+            };
+            let step = 1e-5;
+            let slope = (energy(&mut system, &moved(step)) - energy(&mut system, &moved(-step))) / (2.0 * step);
+            let exact: f64 =
+                -force.as_flattened().iter().zip(direction.as_flattened()).map(|(f, d)| f * d).sum::<f64>();
+            assert!((slope - exact).abs() < 1e-7 * scale, "{material:?}: {slope} for {exact}");
+            let mut product = vec![[0.0; 3]; x.len()];
+            matrix.multiply(&direction, &mut product);
+            let [after, before] = [step, -step].map(|by| linearised(&mut system, &moved(by), Curvature::Exact).0);
+            let largest = product.as_flattened().iter().fold(0.0_f64, |largest, f| largest.max(f.abs()));
+            for vertex in 0..x.len() {
+                for axis in 0..3 {
+                    let difference = (before[vertex][axis] - after[vertex][axis]) / (2.0 * step);
+                    let exact = product[vertex][axis];
+                    assert!((difference - exact).abs() < 1e-6 * largest, "{material:?}: {difference} for {exact}");
+                }
+            }
+        }
+    }
+}
