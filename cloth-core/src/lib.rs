@@ -6,6 +6,7 @@
 //!
 //! - [`physics`], a crate of its own: meshes, fabrics, contact, integrators
 //! - [`scene`], a crate of its own: the file format
+//! - [`mod@measure`]: forces of pins, strain of garments, drape
 //! - [`ledger`], [`model`]: the energy balance, and the assembly of a scene into islands
 //! - [`simulation`], [`output`]: stepping, sleep, saved states; frames, animations and pictures
 //! - [`run`]: runs with checkpoints and reports
@@ -52,6 +53,7 @@ pub mod bench;
 pub mod demo;
 pub mod ledger;
 pub mod materials;
+pub mod measure;
 pub mod model;
 pub mod output;
 pub mod run;

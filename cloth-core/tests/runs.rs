@@ -81,11 +81,12 @@ fn read(folder: &Path, name: &str) -> Vec<u8> {
 }
 
 /// Returns a summary without the step times.
-const REPEATABLE: [&str; 8] = [
+const REPEATABLE: [&str; 9] = [
     "cloth.png",
     "cloth.glb",
     "cloth.usda",
     "ledger.csv",
+    "measurements.csv",
     "ledger.svg",
     "frames/cloth_0000.obj",
     "frames/cloth_0007.obj",
@@ -491,6 +492,9 @@ fn a_sweep_runs_all_combinations_and_continues_where_it_was_killed() {
         rows[0][..6],
         ["garment.0.fabric.density", "obstacles.0.friction", "folder", "status", "steps", "frames"]
     );
+    let measured = rows[0].iter().position(|name| *name == "cloth warp mean").unwrap();
+    assert!(rows[1][measured].parse::<f64>().unwrap().abs() > 1e-6, "{index}");
+    assert_eq!((rows[0].len(), rows[3].len(), rows[3][measured]), (rows[1].len(), rows[1].len(), ""));
     let found: Vec<_> = rows[1..].iter().map(|row| (row[0], row[1], row[3], row[4])).collect();
     let done = [("0.2", "0.1", "done", "10"), ("0.2", "0.3", "done", "10")];
     assert_eq!(found, [&done[..], &[("-1.0", "0.1", "failed", ""), ("-1.0", "0.3", "failed", "")]].concat());

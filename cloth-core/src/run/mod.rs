@@ -31,6 +31,7 @@ pub use report::{ReportError, write_report};
 pub use results::Ending;
 
 use crate::integrator::StepReport;
+use crate::measure::{Measurements, Reading};
 use crate::output::{AnimationError, OutputError, OutputFolder, PictureError, Scenery};
 use crate::scene::{Scene, SceneError};
 use crate::simulation::{Simulation, SimulationError};
@@ -115,6 +116,7 @@ pub struct Run {
     folder: OutputFolder,
     simulation: Simulation,
     frames: FrameStore,
+    measurements: Measurements,
     /// Pictures of the frames; `None` before the first step, or if the scene does not want them.
     pictures: Option<FramePictures>,
     /// The largest number of threads.
@@ -159,6 +161,7 @@ impl Run {
             text,
             path: path.to_owned(),
             folder,
+            measurements: simulation.measurements(),
             simulation,
             frames: FrameStore::new(saved, &scene.output)?,
             pictures: None,
@@ -244,6 +247,7 @@ impl Run {
             folder,
             simulation,
             frames,
+            measurements: saved.measurements,
             pictures: None,
             threads: available_threads(),
             checkpoint_interval: Some(saved.every),
@@ -360,6 +364,8 @@ impl Run {
             pictures.add(Frame::clone(&frame))?;
         }
         self.frames.add(frame, &vectors)?;
+        // JSON has no infinite forces; such a run is about to fail.
+        self.measurements.readings.extend(Some(self.simulation.reading()).filter(Reading::is_finite));
         Ok(())
     }
 
@@ -373,6 +379,7 @@ impl Run {
             every: self.checkpoint_interval.unwrap_or(u64::MAX),
             frames: self.frames.frames().len(),
             frames_checksum: self.frames.checksum(),
+            measurements: self.measurements.clone(),
             state: self.simulation.save(),
         };
         self.folder.write_checkpoint(&checkpoint.to_bytes()?)?;
