@@ -11,6 +11,8 @@
 //! - [`simulation`], [`output`]: stepping, sleep, saved states; frames, animations and pictures
 //! - [`run`]: runs with checkpoints and reports
 //! - [`sweep`]: the scenes of a sweep
+//! - [`survey`]: what a finished run, a scene or a mesh measures
+//! - [`tester`]: tests of a textile lab
 //! - [`view`], [`demo`], [`materials`], [`mod@bench`], [`validate`]: what the binary offers on top
 //!
 //! ```
@@ -58,7 +60,11 @@ pub mod model;
 pub mod output;
 pub mod run;
 pub mod simulation;
+#[cfg(feature = "program")]
+pub mod survey;
 pub mod sweep;
+#[cfg(feature = "program")]
+pub mod tester;
 #[cfg(feature = "program")]
 pub mod validate;
 #[cfg(feature = "program")]

@@ -11,6 +11,7 @@ mod memory_need;
 mod progress;
 mod progress_lines;
 mod record;
+mod recorded_frame;
 mod report;
 mod results;
 pub mod stats;
@@ -27,6 +28,7 @@ pub use forecast::Forecast;
 pub use memory_need::MemoryNeed;
 pub use progress::{Log, Progress};
 pub use record::{Record, RecordError};
+pub use recorded_frame::{FrameError, read_frame};
 pub use report::{ReportError, write_report};
 pub use results::Ending;
 

@@ -70,7 +70,9 @@ impl Run {
         let summary = self.summary_of_good_steps(failure.as_ref())?;
         written.add(true, || self.write_summary(&summary));
         written.add(true, || self.write_record(&summary));
-        written.add(true, || self.write(OutputFolder::MEASUREMENTS, self.measurements.csv().as_bytes()));
+        written.add(self.scene.output.measurements, || {
+            self.write(OutputFolder::MEASUREMENTS, self.measurements.csv().as_bytes())
+        });
         self.write_ledger(&mut written);
         self.write_shows(&mut written);
         if let Some(mut pictures) = self.pictures.take() {

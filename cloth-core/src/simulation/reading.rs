@@ -7,7 +7,7 @@ use energy_solve::State;
 
 use super::{Island, Simulation};
 use crate::geometry::add_scaled;
-use crate::measure::{Measurements, PinReading, Reading, StrainGauge};
+use crate::measure::{Measurements, PinReading, Reading, Strain, StrainGauge};
 use crate::model::{Model, PartKind, PinnedVertices};
 use crate::scene::Scene;
 
@@ -120,9 +120,19 @@ impl Simulation {
             let x: Vec<Vector3<f64>> = pin.chosen.iter().map(|&vertex| self.x[vertex]).collect();
             PinReading::of(&forces, &x)
         };
+        let pins = self.pins.iter().zip(self.spring_forces()).map(load).collect();
+        Reading { time: self.time(), pins, strains: self.strains_at(&self.x) }
+    }
+
+    /// Returns the strain of each garment at other positions of all vertices, in m; `None` if no triangle of a garment
+    /// has a warp direction.
+    ///
+    /// # Panics
+    /// Panics if there are fewer positions than vertices.
+    #[must_use]
+    pub fn strains_at(&self, x: &[Vector3<f64>]) -> Vec<Option<Strain>> {
         let of_part = self.gauges.iter().zip(&self.parts);
-        let strains = of_part.map(|(gauge, part)| gauge.strain(&self.x[part.vertices.clone()])).collect();
-        Reading { time: self.time(), pins: self.pins.iter().zip(self.spring_forces()).map(load).collect(), strains }
+        of_part.map(|(gauge, part)| gauge.strain(&x[part.vertices.clone()])).collect()
     }
 
     /// Returns the names of pins and garments, without readings.
