@@ -142,11 +142,11 @@ mod tests {
         let angle = CURVATURE * LENGTH;
         let [end, mean] = arc(CURVATURE);
         let exact = [angle.sin() / CURVATURE, (1.0 - angle.cos()) / CURVATURE];
-        assert!((0..2).all(|axis| (end[axis] - exact[axis]).abs() < 5e-6), "{end:?} {exact:?}");
+        assert!((0..2).all(|axis| (end[axis] - exact[axis]).abs() < 2e-5), "{end:?} {exact:?}");
         // The centroid of an arc lies at (sin(θ/2)/(θ/2)) r from its centre, in the direction of the middle.
         let reach = (0.5 * angle).sin() / (0.5 * angle) / CURVATURE;
         let exact = [reach * (0.5 * angle).sin(), 1.0 / CURVATURE - reach * (0.5 * angle).cos()];
-        assert!((0..2).all(|axis| (mean[axis] - exact[axis]).abs() < 5e-6), "{mean:?} {exact:?}");
+        assert!((0..2).all(|axis| (mean[axis] - exact[axis]).abs() < 2e-5), "{mean:?} {exact:?}");
         let last = bent([0.5 * LENGTH, 0.3, 0.0], CURVATURE);
         assert!(
             (last[0] + 0.5 * LENGTH - end[0]).abs() < 1e-12 && (last[2] - end[1]).abs() < 1e-12,

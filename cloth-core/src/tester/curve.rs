@@ -13,12 +13,16 @@ fn at(branch: &[[f64; 2]], x: f64) -> Option<f64> {
 
 /// Divides a curve where x turns.
 fn branches(curve: &[[f64; 2]]) -> Vec<&[[f64; 2]]> {
-    let turns = |at: &usize| (curve[*at][0] - curve[at - 1][0]) * (curve[at + 1][0] - curve[*at][0]) < 0.0;
-    let mut found = Vec::new();
-    let mut start = 0;
-    for turn in (1..curve.len().saturating_sub(1)).filter(turns) {
-        found.push(&curve[start..=turn]);
-        start = turn;
+    let (mut found, mut start, mut direction) = (Vec::new(), 0, 0.0);
+    for at in 1..curve.len() {
+        let way = curve[at][0] - curve[at - 1][0];
+        if way * direction < 0.0 {
+            found.push(&curve[start..at]);
+            start = at - 1;
+        }
+        if way != 0.0 {
+            direction = way;
+        }
     }
     found.push(&curve[start..]);
     found

@@ -38,7 +38,13 @@ pub(super) fn specimen() -> Result<TriangleMesh, MeshError> {
     TriangleMesh::new(mesh.vertices().iter().map(place).collect(), mesh.triangles().to_vec())
 }
 
-/// Returns the test; `mesh` is the name of the file of the specimen.
+/// The table below the specimen starts this far under it, and goes down by `TABLE_WAY` in `TABLE_TIME`: in m and s.
+const TABLE: f64 = 0.005;
+const TABLE_WAY: f64 = 0.15;
+const TABLE_TIME: f64 = 3.0;
+
+/// Returns the test; `mesh` is the name of the file of the specimen. The specimen lies on a table that is lowered, as on
+/// the drapemeter: cloth that falls at once has more folds.
 pub(super) fn scene(mesh: &str) -> SceneText {
     let inside = RINGS * 3 / 5;
     let held: Vec<usize> = (0..1 + 3 * inside * (inside + 1)).collect();
@@ -47,7 +53,11 @@ pub(super) fn scene(mesh: &str) -> SceneText {
                contact = \"on\"\n"
             .to_owned(),
         mesh: format!("warp = [1.0, 0.0, 0.0]\nmesh.obj.path = \"{mesh}\"\n"),
-        tail: format!("[[pins]]\nname = \"discs\"\nvertices = {held:?}\n"),
+        tail: format!(
+            "[[pins]]\nname = \"discs\"\nvertices = {held:?}\n[[obstacles]]\nname = \"table\"\n\
+             plane = {{ point = [0.0, 0.0, -{TABLE:?}], normal = [0.0, 0.0, 1.0] }}\n\
+             motion.keys = [{{ time = 0.0 }}, {{ time = {TABLE_TIME:?}, translate = [0.0, 0.0, -{TABLE_WAY:?}] }}]\n"
+        ),
     }
 }
 
