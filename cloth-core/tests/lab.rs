@@ -52,7 +52,11 @@ fn a_run_its_scene_and_its_last_mesh_have_the_same_measurements() {
     };
     let (run, scene) = (of("out"), of("strip.toml"));
     assert_eq!(run["measurements"], scene["measurements"]);
-    assert_eq!(run["garments"][0]["strain"], scene["garments"][0]["strain"]);
+    // Frames have nine digits.
+    for quantity in ["warp", "weft"] {
+        let of = |survey: &Value| survey["garments"][0]["strain"][quantity]["mean"].as_f64().unwrap();
+        assert!((of(&run) - of(&scene)).abs() < 1e-7, "{quantity}");
+    }
     // Without coupling the strip stretches uniformly: P = Y (ε + ε²/2)(1 + ε).
     let last = &run["pull"]["points"][10];
     let expected = 0.1 * 100.0 * 0.105 * 1.1;

@@ -87,7 +87,7 @@ mod tests {
         let pin = |x: f64, force: f64| PinReading::of(&[[force, 0.5, 0.0]], &[[x, 0.0, 0.0]]);
         let reading = |time: f64| Reading {
             time,
-            pins: vec![pin(0.0, 3.0 * time), pin(0.2 + 0.1 * time, -2.0 * time), pin(0.2 + 0.1 * time, -1.0 * time)],
+            pins: vec![pin(0.0, 3.0 * time), pin(0.2 + 0.1 * time, -2.0 * time), pin(0.2 + 0.1 * time, -time)],
             strains: Vec::new(),
         };
         let pins = names.map(|name| name.map(str::to_owned)).to_vec();
