@@ -402,8 +402,8 @@ class Simulation(_Simulation):
         return Contacts(*self.contact_pairs())
 
     def reading(self) -> dict[str, float]:
-        """Returns force (N), moment (N m) and mean position (m) of each pin and group of pins, and mean, largest, 5th and
-        95th percentile of the strain of each garment along warp and weft and of its shear angle (°), by column:
+        """Returns force (N), moment (N m) and mean position (m) of each pin and group of pins, and mean, largest, 5th
+        and 95th percentile of the strain of each garment along warp and weft and of its shear angle (°), by column:
         `pin 0 Fx [N]`, `group jaw Mz [N m]`, `shirt warp 95%`. A strain that does not exist is NaN.
 
         A force is that of the cloth on the pin, with weight and inertia of the held vertices.

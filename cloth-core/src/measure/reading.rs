@@ -122,8 +122,8 @@ impl Measurements {
         pins.chain(groups.map(sum)).collect()
     }
 
-    /// Names of the numbers of a reading, with units: `time [s]`; force, moment and position of each pin and group, such
-    /// as `pin 0 Fx [N]`; strains of each garment, such as `shirt warp 95%`.
+    /// Names of the numbers of a reading, with units: `time [s]`; force, moment and position of each pin and group
+    /// (`pin 0 Fx [N]`); strains of each garment (`shirt warp 95%`).
     #[must_use]
     pub fn columns(&self) -> Vec<String> {
         let mut columns = vec!["time [s]".to_owned()];

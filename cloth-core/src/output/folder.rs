@@ -43,7 +43,8 @@ fn is_there(path: &Path) -> bool {
 }
 
 /// The output folder of a run: `cloth.png`, `cloth.glb`, `cloth.usda`, `ledger.csv`, `ledger.svg`, `contact.svg`,
-/// `measurements.csv`, `summary.txt`, `run.json`, `frames/cloth_0000.obj`, … and the checkpoint. Files are written atomically.
+/// `measurements.csv`, `summary.txt`, `run.json`, `frames/cloth_0000.obj`, … and the checkpoint. Files are
+/// written atomically.
 #[derive(Clone, Debug)]
 pub struct OutputFolder {
     path: PathBuf,

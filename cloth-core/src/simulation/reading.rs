@@ -22,8 +22,8 @@ pub(super) fn gauges(scene: &Scene, model: &Model) -> Vec<StrainGauge> {
 }
 
 impl Simulation {
-    /// Returns the force of the cloth on what holds each vertex, in N: on its exact pin, or on the root of a hair. It is
-    /// zero for free vertices, also for those that springs pull.
+    /// Returns the force of the cloth on what holds each vertex, in N: its exact pin, or the root of a hair. It is zero
+    /// for free vertices, also for those that springs pull.
     ///
     /// It is the residual of the held row, f(x, v) + m (g − c v − a): the forces f of all elements that have a free
     /// vertex, damping and certified contact included, at the end of the last step, and weight, drag c and inertia of
@@ -155,7 +155,10 @@ integrator = "newton"
 contact = "off"
 tolerances.velocity = 1e-8
 mesh.sheet = { cells = [8, 4], size = [0.2, 0.1], plane = "vertical" }
-fabric = { density = 2.0, rayleigh.stretching = 0.01, material.stvk = { stretch_stiffness = 80.0, poisson_ratio = 0.2 } }
+[fabric]
+density = 2.0
+rayleigh.stretching = 0.01
+material.stvk = { stretch_stiffness = 80.0, poisson_ratio = 0.2 }
 "#;
 
     fn stepped(scene: &str, mut after_step: impl FnMut(&Simulation)) -> Simulation {

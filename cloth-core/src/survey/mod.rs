@@ -43,7 +43,10 @@ pub enum SurveyError {
     #[error("there is no garment called `{name}`; there are {}", .known.join(", "))]
     NoSuchGarment { name: String, known: Vec<String> },
     /// There is no pin or group with this label.
-    #[error("there is no pin or group `{name}`; there are {}", if .known.is_empty() { "none".to_owned() } else { .known.join(", ") })]
+    #[error(
+        "there is no pin or group `{name}`; there are {}",
+        if .known.is_empty() { "none".to_owned() } else { .known.join(", ") }
+    )]
     NoSuchPin { name: String, known: Vec<String> },
     /// The drape of a garment cannot be measured.
     #[error("{garment}: {source}")]

@@ -3,7 +3,7 @@
 use energy_dsl::Vector3;
 
 use super::curve::Curve;
-use super::scene::{Keys, SceneText, key};
+use super::scene::{Keys, SceneText, key, pin};
 use super::{TestedFabric, TesterError, Threads};
 use crate::geometry::{cross, subtract};
 use crate::measure::{Measurements, Reading};
@@ -59,11 +59,7 @@ pub(super) fn scene(threads: Threads) -> SceneText {
     };
     let clamp = |name: &str, sign: f64, motion: &str| {
         let ends = [sign * 0.5 * (LENGTH - 1.2 * CELL), sign * 0.5 * (LENGTH + 1.2 * CELL)];
-        let [low, high] = [ends[0].min(ends[1]), ends[0].max(ends[1])];
-        format!(
-            "[[pins]]\nname = \"{name}\"\nbox = {{ min = [{low:?}, -{0:?}, -1e-3], max = [{high:?}, {0:?}, 1e-3] }}\n{motion}",
-            LENGTH
-        )
+        pin(name, [ends[0].min(ends[1]), ends[0].max(ends[1])], LENGTH, motion)
     };
     let duration = STEP * f64::from(4 * QUARTER);
     SceneText {
@@ -97,8 +93,8 @@ pub(super) fn curve(measured: &Measurements) -> Curve {
     measured.readings.iter().enumerate().map(point).collect()
 }
 
-/// Returns curvature in 1/m and moment per width in N of the declared material on the polygon: M = (1/b) dE/dθ, with the
-/// stored energy E, the angle θ between the clamps and the width b.
+/// Returns curvature in 1/m and moment per width in N of the declared material on the polygon: M = (1/b) dE/dθ, with
+/// the stored energy E, the angle θ between the clamps and the width b.
 pub(super) fn input(fabric: &TestedFabric, threads: Threads) -> Result<Curve, TesterError> {
     let mut simulation = Simulation::new(&fabric.scene(&scene(threads))?)?;
     let rest = simulation.positions().to_vec();

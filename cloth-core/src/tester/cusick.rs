@@ -43,8 +43,8 @@ const TABLE: f64 = 0.005;
 const TABLE_WAY: f64 = 0.15;
 const TABLE_TIME: f64 = 3.0;
 
-/// Returns the test; `mesh` is the name of the file of the specimen. The specimen lies on a table that is lowered, as on
-/// the drapemeter: cloth that falls at once has more folds.
+/// Returns the test; `mesh` is the name of the file of the specimen. It lies on a table that is lowered, as on the
+/// drapemeter: cloth that falls at once has more folds.
 pub(super) fn scene(mesh: &str) -> SceneText {
     let inside = RINGS * 3 / 5;
     let held: Vec<usize> = (0..1 + 3 * inside * (inside + 1)).collect();

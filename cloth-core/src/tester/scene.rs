@@ -62,3 +62,10 @@ impl Keys {
         }
     }
 }
+
+/// Returns the table of a pin that holds what lies between two x, up to a width to either side. `motion` is that of
+/// [`Keys::toml`].
+pub(super) fn pin(name: &str, [low, high]: [f64; 2], side: f64, motion: &str) -> String {
+    let corners = format!("min = [{low:?}, -{side:?}, -1e-3], max = [{high:?}, {side:?}, 1e-3]");
+    format!("[[pins]]\nname = \"{name}\"\nbox = {{ {corners} }}\n{motion}")
+}

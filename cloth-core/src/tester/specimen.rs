@@ -3,7 +3,7 @@
 use energy_dsl::Vector3;
 
 use super::curve::Curve;
-use super::scene::{Keys, SceneText, key};
+use super::scene::{Keys, SceneText, key, pin};
 use super::{TesterError, Threads};
 use crate::measure::Measurements;
 use crate::simulation::Simulation;
@@ -34,13 +34,7 @@ const STEP: f64 = 0.1;
 fn scene(threads: Threads, motion: &Keys, duration: f64) -> SceneText {
     let warp = threads.across_clamps();
     let half = [0.5 * LENGTH, 0.5 * WIDTH];
-    let jaw = |name: &str, x: f64, motion: &str| {
-        let [low, high] = [x - 1e-4, x + 1e-4];
-        format!(
-            "[[pins]]\nname = \"{name}\"\nbox = {{ min = [{low:?}, -{0:?}, -1e-3], max = [{high:?}, {0:?}, 1e-3] }}\n{motion}",
-            half[1] + 1e-3
-        )
-    };
+    let jaw = |name: &str, x: f64, motion: &str| pin(name, [x - 1e-4, x + 1e-4], half[1] + 1e-3, motion);
     let pins = [jaw("fixed jaw", -half[0], ""), jaw("moving jaw", half[0], &motion.toml())].concat();
     SceneText {
         head: format!(
