@@ -189,4 +189,14 @@ fn what_is_no_fabric_is_refused() {
         assert!(message.contains(part), "{message}");
         assert!(!folder.path().join("out").exists(), "{fabric}");
     }
+    // Elements of its own lie beside the file of the fabric, or where the user allows.
+    std::fs::create_dir(folder.path().join("mine")).unwrap();
+    let own = "[fabric]\ndensity = 0.2\nmaterial.file = { path = \"../own.energy\", parameters = { k = 40.0 } }\n";
+    write("mine/fabric.toml", own);
+    write("own.energy", "energy Spring(p, q: Point; k: Scalar[N/m], L: Scalar[m]) = \"k/2 (‖p − q‖ − L)²\";\n");
+    let message = refused(&["test", "mine/fabric.toml", "-o", "out", "--only", "tensile"], folder.path());
+    assert!(message.contains("own.energy is outside the scene's folder"), "{message}");
+    let table =
+        succeeds(&["test", "mine/fabric.toml", "-o", "out", "--only", "shear", "--allow-path", "."], folder.path());
+    assert!(table.contains("gf/(cm °)"), "{table}");
 }

@@ -76,6 +76,9 @@ impl Measure {
         let (interrupts, bar) = (Interrupts::listen()?, progress_bar(scene.steps()));
         let is_stopped = || interrupts.flag().load(Ordering::Relaxed);
         let survey = Survey::of_scene(&scene, options, |simulation| {
+            if simulation.steps_done() == 0 {
+                simulation.warnings().iter().for_each(|warning| tell(&format!("warning: {warning}")));
+            }
             bar.set_position(simulation.steps_done());
             !is_stopped()
         });

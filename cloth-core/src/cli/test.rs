@@ -11,6 +11,7 @@ use cloth_core::tester::{Results, TestedFabric, Trial};
 use energy_cli::{Interrupts, Notice, tell};
 use energy_files::{FolderLock, remove_parts};
 
+use super::allowed_folders::AllowedFolders;
 use super::print;
 
 #[derive(Debug, Args)]
@@ -32,6 +33,8 @@ pub struct Test {
     /// Maximum number of threads; default: one per core. Results are bit-identical.
     #[arg(long, value_parser = clap::value_parser!(u16).range(1..))]
     threads: Option<u16>,
+    #[command(flatten)]
+    allowed: AllowedFolders,
     /// Print curves and numbers as JSON, as in `results.json`.
     #[arg(long)]
     json: bool,
@@ -40,6 +43,7 @@ pub struct Test {
 impl Test {
     pub fn run(self) -> Result<ExitCode> {
         let fabric = TestedFabric::find(&self.fabric)?;
+        fabric.check_paths(self.allowed.folders())?;
         let is_wanted = |trial: &Trial| self.only.is_empty() || self.only.iter().any(|kind| kind == trial.kind());
         let trials: Vec<Trial> = Trial::ALL.into_iter().filter(is_wanted).collect();
         energy_files::create_folder(&self.output)

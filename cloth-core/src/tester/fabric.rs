@@ -18,6 +18,8 @@ pub struct TestedFabric {
     name: String,
     /// The value of the key `fabric` of a garment.
     value: Value,
+    /// The folder of the file; `None` for a fabric of the library.
+    folder: Option<PathBuf>,
 }
 
 impl TestedFabric {
@@ -37,12 +39,28 @@ impl TestedFabric {
         let found = if is_file {
             Self::read(path)?
         } else {
-            Self { name: name_or_file.to_owned(), value: Value::String(name_or_file.to_owned()) }
+            Self { name: name_or_file.to_owned(), value: Value::String(name_or_file.to_owned()), folder: None }
         };
-        let sample = "mesh.sheet = { cells = [1, 1], size = [1.0, 1.0] }\n";
-        let (head, tail) = ("dt = 0.1\nduration = 0.1\n".to_owned(), String::new());
-        found.scene(&SceneText { head, mesh: sample.to_owned(), tail })?;
+        found.sample()?;
         Ok(found)
+    }
+
+    /// Returns a small scene with this fabric.
+    fn sample(&self) -> Result<Scene, TesterError> {
+        let mesh = "mesh.sheet = { cells = [1, 1], size = [1.0, 1.0] }\n".to_owned();
+        let (head, tail) = ("dt = 0.1\nduration = 0.1\n".to_owned(), String::new());
+        self.scene(&SceneText { head, mesh, tail })
+    }
+
+    /// Checks that the fabric reads files of its own folder and of some others only; see [`Scene::check_paths`].
+    ///
+    /// # Errors
+    /// Returns an error for the first file that is elsewhere.
+    pub fn check_paths(&self, allowed: &[PathBuf]) -> Result<(), TesterError> {
+        let own =
+            self.folder.iter().map(|folder| if folder.as_os_str().is_empty() { ".".into() } else { folder.clone() });
+        let folders: Vec<PathBuf> = own.chain(allowed.iter().cloned()).collect();
+        Ok(self.sample()?.check_paths(&folders)?)
     }
 
     fn read(path: &Path) -> Result<Self, TesterError> {
@@ -56,7 +74,7 @@ impl TestedFabric {
         let mut value = file.remove("fabric").ok_or_else(|| TesterError::NoFabric { path: path.to_owned() })?;
         resolve(&mut value, path.parent().unwrap_or(Path::new("")));
         let name = path.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
-        Ok(Self { name, value })
+        Ok(Self { name, value, folder: path.parent().map(Path::to_owned) })
     }
 
     /// The name in the library, or that of the file.
