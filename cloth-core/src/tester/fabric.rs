@@ -18,8 +18,8 @@ pub struct TestedFabric {
     name: String,
     /// The value of the key `fabric` of a garment.
     value: Value,
-    /// The folder of the file; `None` for a fabric of the library.
-    folder: Option<PathBuf>,
+    /// Path of the file; the name of a fabric of the library.
+    path: PathBuf,
 }
 
 impl TestedFabric {
@@ -39,7 +39,7 @@ impl TestedFabric {
         let found = if is_file {
             Self::read(path)?
         } else {
-            Self { name: name_or_file.to_owned(), value: Value::String(name_or_file.to_owned()), folder: None }
+            Self { name: name_or_file.to_owned(), value: Value::String(name_or_file.to_owned()), path: path.to_owned() }
         };
         found.sample()?;
         Ok(found)
@@ -57,10 +57,7 @@ impl TestedFabric {
     /// # Errors
     /// Returns an error for the first file that is elsewhere.
     pub fn check_paths(&self, allowed: &[PathBuf]) -> Result<(), TesterError> {
-        let own =
-            self.folder.iter().map(|folder| if folder.as_os_str().is_empty() { ".".into() } else { folder.clone() });
-        let folders: Vec<PathBuf> = own.chain(allowed.iter().cloned()).collect();
-        Ok(self.sample()?.check_paths(&folders)?)
+        Ok(self.sample()?.check_paths(allowed)?)
     }
 
     fn read(path: &Path) -> Result<Self, TesterError> {
@@ -74,7 +71,7 @@ impl TestedFabric {
         let mut value = file.remove("fabric").ok_or_else(|| TesterError::NoFabric { path: path.to_owned() })?;
         resolve(&mut value, path.parent().unwrap_or(Path::new("")));
         let name = path.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
-        Ok(Self { name, value, folder: path.parent().map(Path::to_owned) })
+        Ok(Self { name, value, path: path.to_owned() })
     }
 
     /// The name in the library, or that of the file.
@@ -85,7 +82,7 @@ impl TestedFabric {
 
     /// Returns a scene with this fabric as TOML.
     pub(super) fn text(&self, scene: &SceneText) -> Result<String, TesterError> {
-        let path = PathBuf::from(&self.name);
+        let path = self.path.clone();
         let malformed = |source: toml::de::Error| TesterError::Malformed { path, message: source.to_string() };
         let mut table: Table = scene.toml().parse().map_err(malformed)?;
         let garments = table.get_mut("garment").and_then(Value::as_array_mut);
@@ -98,7 +95,7 @@ impl TestedFabric {
 
     /// Returns a scene with this fabric.
     pub(super) fn scene(&self, scene: &SceneText) -> Result<Scene, TesterError> {
-        Ok(Scene::parse(&self.text(scene)?, &PathBuf::from(&self.name))?)
+        Ok(Scene::parse(&self.text(scene)?, &self.path)?)
     }
 }
 
