@@ -50,7 +50,7 @@ impl PinReading {
     }
 }
 
-/// What was measured at one time.
+/// The measurements at one time.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Reading {
     /// Time, in s.

@@ -16,7 +16,7 @@ use crate::run::{FrameError, Record, RecordError, read_frame};
 use crate::scene::{Scene, SceneError};
 use crate::simulation::{Simulation, SimulationError};
 
-/// Something that cannot be measured.
+/// A run, scene or mesh that cannot be measured.
 #[derive(Debug, thiserror::Error)]
 #[expect(missing_docs, reason = "the messages name the fields")]
 #[non_exhaustive]
@@ -53,7 +53,7 @@ pub enum SurveyError {
     Drape { garment: String, source: DrapeError },
 }
 
-/// What to measure.
+/// Selects the garments, pins and discs to measure.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub struct SurveyOptions {

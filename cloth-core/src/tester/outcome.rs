@@ -23,9 +23,9 @@ pub struct Number {
     pub name: String,
     /// Its unit.
     pub unit: &'static str,
-    /// That of the simulated test; `None` if it does not exist, such as the extension at a load that was not reached.
+    /// Value of the simulated test; `None` if it does not exist, such as the extension at a load that was not reached.
     pub simulated: Option<f64>,
-    /// That of the declared material; `None` if it has none.
+    /// Value of the declared material; `None` if it has none.
     pub input: Option<f64>,
     /// The simulated number in the unit of KES, with that unit; `None` if it is the same.
     pub kes: Option<(f64, &'static str)>,
@@ -38,7 +38,7 @@ pub struct Outcome {
     pub trial: String,
     /// Its kind, one of [`Trial::KINDS`].
     pub kind: &'static str,
-    /// What the columns of the curves are, with units.
+    /// Quantities of the two columns of the curves, with units.
     pub axes: [&'static str; 2],
     /// The simulated curve; for the drape, the outline of the shadow.
     pub simulated: Curve,
