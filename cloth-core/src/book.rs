@@ -10,6 +10,8 @@ mod audit {}
 mod integrators {}
 #[doc = include_str!("../../docs/book/contact.md")]
 mod contact {}
+#[doc = include_str!("../../docs/book/lab.md")]
+mod lab {}
 #[doc = include_str!("../../docs/book/performance.md")]
 mod performance {}
 #[doc = include_str!("../../docs/book/first-hour.md")]

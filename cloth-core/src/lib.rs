@@ -6,10 +6,13 @@
 //!
 //! - [`physics`], a crate of its own: meshes, fabrics, contact, integrators
 //! - [`scene`], a crate of its own: the file format
+//! - [`mod@measure`]: forces of pins, strain of garments, drape
 //! - [`ledger`], [`model`]: the energy balance, and the assembly of a scene into islands
 //! - [`simulation`], [`output`]: stepping, sleep, saved states; frames, animations and pictures
 //! - [`run`]: runs with checkpoints and reports
 //! - [`sweep`]: the scenes of a sweep
+//! - [`survey`]: what a finished run, a scene or a mesh measures
+//! - [`tester`]: tests of a textile lab
 //! - [`view`], [`demo`], [`materials`], [`mod@bench`], [`validate`]: what the binary offers on top
 //!
 //! ```
@@ -52,11 +55,16 @@ pub mod bench;
 pub mod demo;
 pub mod ledger;
 pub mod materials;
+pub mod measure;
 pub mod model;
 pub mod output;
 pub mod run;
 pub mod simulation;
+#[cfg(feature = "program")]
+pub mod survey;
 pub mod sweep;
+#[cfg(feature = "program")]
+pub mod tester;
 #[cfg(feature = "program")]
 pub mod validate;
 #[cfg(feature = "program")]

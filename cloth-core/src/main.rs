@@ -34,6 +34,10 @@ enum Command {
     Resume(cli::resume::Resume),
     /// Run a scene with all combinations of some values; one folder for each run, one index of all.
     Sweep(cli::sweep::Sweep),
+    /// Measure a finished run, a scene or a mesh: drape coefficient and nodes, strain, extension against force.
+    Measure(cli::measure::Measure),
+    /// Test a fabric as a lab does: KES tensile, shear and bending, and Cusick's drape, beside the declared material.
+    Test(cli::test::Test),
     /// Write report.html of a finished run: picture, energies, times, evaluation counts, audit of its elements.
     Report(cli::report::Report),
     /// Write a picture of a scene or a run, without a display (`--screenshot`). `cloth-window` shows them in a window.
@@ -69,6 +73,8 @@ fn run(command: Command) -> Result<ExitCode> {
         Command::Run(scene) => return scene.run(),
         Command::Resume(resume) => return resume.run(),
         Command::Sweep(sweep) => return sweep.run(),
+        Command::Measure(measure) => return measure.run(),
+        Command::Test(test) => return test.run(),
         Command::Report(report) => report.run(),
         Command::View(view) => view.run(),
         Command::Schema => cli::schema::run(),

@@ -13,6 +13,7 @@ mod frame_rates;
 mod hostile_folders;
 mod hostile_scenes;
 mod known_answers;
+mod lab;
 mod limits;
 mod linear_solvers;
 mod local_elimination;

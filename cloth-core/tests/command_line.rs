@@ -66,7 +66,7 @@ fn a_run_writes_a_picture_animations_and_frames() {
     assert_eq!(last.lines().filter(|line| line.starts_with("f ")).count(), 72);
     assert_ne!(read("frames/cloth_0000.obj"), read("frames/cloth_0005.obj"));
     let names: Vec<_> = std::fs::read_dir(folder.path().join("out")).unwrap().map(|e| e.unwrap().file_name()).collect();
-    assert_eq!(names.len(), 8, "nothing temporary is left: {names:?}");
+    assert_eq!(names.len(), 9, "nothing temporary is left: {names:?}");
 
     // A second run is rejected without --overwrite; with it, no frame of the first remains.
     let again = cloth(&["run", "scene.toml", "-o", "out"], folder.path());

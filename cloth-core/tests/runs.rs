@@ -81,11 +81,12 @@ fn read(folder: &Path, name: &str) -> Vec<u8> {
 }
 
 /// Returns a summary without the step times.
-const REPEATABLE: [&str; 8] = [
+const REPEATABLE: [&str; 9] = [
     "cloth.png",
     "cloth.glb",
     "cloth.usda",
     "ledger.csv",
+    "measurements.csv",
     "ledger.svg",
     "frames/cloth_0000.obj",
     "frames/cloth_0007.obj",
@@ -153,16 +154,16 @@ fn damaged_newer_and_foreign_checkpoints_are_rejected() {
     assert!(with(&good[..good.len() / 2]).contains("is damaged: it is cut short"));
     let of_version = |version: &str| {
         String::from_utf8(good.clone()).unwrap().replacen(
-            "cloth-checkpoint 4 ",
+            "cloth-checkpoint 5 ",
             &format!("cloth-checkpoint {version} "),
             1,
         )
     };
     assert!(
-        with(of_version("5").as_bytes()).contains("has version 5, but this program reads version 4; use the newer")
+        with(of_version("6").as_bytes()).contains("has version 6, but this program reads version 5; use the newer")
     );
     assert!(
-        with(of_version("3").as_bytes()).contains("has version 3, but this program reads version 4; start the run")
+        with(of_version("4").as_bytes()).contains("has version 4, but this program reads version 5; start the run")
     );
     assert!(with(b"something else\n").contains("is not a checkpoint"));
     std::fs::write(&checkpoint, &good).unwrap();
@@ -331,7 +332,8 @@ fn ffmpeg_makes_a_film() {
 
 #[test]
 fn only_the_requested_files_are_written() {
-    let none = "[output]\npng = true\npicture = false\ngltf = false\nusd = false\nobj = false\nledger = false\n";
+    let none = "[output]\npng = true\npicture = false\ngltf = false\nusd = false\nobj = false\nledger = false\n\
+                measurements = false\n";
     let folder = with_scene(&format!("{}{none}", SCENE.replace("duration = 0.3", "duration = 0.02")));
     succeeds(&["run", "scene.toml", "-o", "out"], folder.path());
     let mut names: Vec<String> = std::fs::read_dir(folder.path().join("out"))
@@ -491,6 +493,9 @@ fn a_sweep_runs_all_combinations_and_continues_where_it_was_killed() {
         rows[0][..6],
         ["garment.0.fabric.density", "obstacles.0.friction", "folder", "status", "steps", "frames"]
     );
+    let measured = rows[0].iter().position(|name| *name == "cloth warp mean").unwrap();
+    assert!(rows[1][measured].parse::<f64>().unwrap().abs() > 1e-6, "{index}");
+    assert_eq!((rows[0].len(), rows[3].last()), (rows[1].len(), Some(&"")), "a failed run has no measurements");
     let found: Vec<_> = rows[1..].iter().map(|row| (row[0], row[1], row[3], row[4])).collect();
     let done = [("0.2", "0.1", "done", "10"), ("0.2", "0.3", "done", "10")];
     assert_eq!(found, [&done[..], &[("-1.0", "0.1", "failed", ""), ("-1.0", "0.3", "failed", "")]].concat());

@@ -18,8 +18,9 @@ from collections.abc import Callable as _Callable, Iterable as _Iterable, Mappin
 from typing import TYPE_CHECKING, Any as _Any, NamedTuple as _NamedTuple
 
 from ._energy import Element, Elements, EnergyError, FolderInUseError, Input, ResourceError, Simulation as _Simulation
-from ._energy import Snapshot, System as _System, audit as _audit, catalogue, energies
-from ._energy import library_element as _library_element, resume as _resume, run as _run, show
+from ._energy import Snapshot, System as _System, audit as _audit, catalogue, drape, energies
+from ._energy import library_element as _library_element, measurement_columns as _measurement_columns
+from ._energy import resume as _resume, run as _run, show
 
 if TYPE_CHECKING:
     from .sweeps import Sweep, sweep
@@ -37,7 +38,7 @@ if TYPE_CHECKING:
 __all__ = [
     "AuditReport", "Contacts", "Element", "Elements", "EnergyError", "FolderInUseError", "Input", "Minimum",
     "OwnEnergy", "OwnForce", "ResourceError", "Simulation", "Snapshot", "Sweep", "System", "audit", "catalogue",
-    "element", "energies", "energy", "load", "resume", "run", "show", "simulate", "sweep",
+    "drape", "element", "energies", "energy", "load", "measurements", "resume", "run", "show", "simulate", "sweep",
 ]
 
 
@@ -319,6 +320,7 @@ class Simulation(_Simulation):
       changes, or functions: OwnEnergy, OwnForce;
     - `snapshot()` and `restore(snapshot)` go back with the same bits; `reset()` goes back to the start, without
       building anything;
+    - `pin_forces` and `reading()` are the loads on pins and the strains of garments;
     - `term_forces()` (of the elements that have a free vertex), `contact_forces`, `contacts()` and, after
       `keep_ledger()`, `ledger()` are arrays.
 
@@ -398,6 +400,15 @@ class Simulation(_Simulation):
     def contacts(self) -> Contacts:
         """Returns the pairs in certified contact at the end of the last step."""
         return Contacts(*self.contact_pairs())
+
+    def reading(self) -> dict[str, float]:
+        """Returns force (N), moment (N m) and mean position (m) of each pin and group of pins, and mean, largest, 5th
+        and 95th percentile of the strain of each garment along warp and weft and of its shear angle (°), by column:
+        `pin 0 Fx [N]`, `group jaw Mz [N m]`, `shirt warp 95%`. A strain that does not exist is NaN.
+
+        A force is that of the cloth on the pin, with weight and inertia of the held vertices.
+        """
+        return dict(self.reading_columns())
 
     def ledger(self) -> dict[str, _NDArray[_np.float64]]:
         """Returns the energy balance so far: `time` (s), then energies and works (J), one number for each step.
@@ -482,3 +493,13 @@ def resume(
 ) -> int:
     """Resumes an interrupted run from the checkpoint in its folder, as `cloth resume` does."""
     return _resume(str(output), accept_edited=accept_edited, threads=threads, progress=progress)
+
+
+def measurements(folder: str | _os.PathLike[str]) -> dict[str, _NDArray[_np.float64]]:
+    """Returns the readings of a finished run, by column: `time [s]`, then those of `Simulation.reading`, one number for
+    each frame. A run with more than 100,000 loads on pins has every second frame, every third and so on;
+    `measurements.csv` in its folder has all.
+
+    Raises EnergyError if the folder does not hold a finished run.
+    """
+    return dict(_measurement_columns(folder))

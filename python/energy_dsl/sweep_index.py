@@ -18,11 +18,17 @@ RESULTS = [
 ]
 
 
+def measured(runs: list[dict[str, Any]], names: list[str]) -> list[str]:
+    """Returns the columns of forces and strains at the end of the runs, in the order in which they first occur."""
+    known = {*names, *RESULTS}
+    return list(dict.fromkeys(column for run in runs for column in run if column not in known))
+
+
 def write_index(folder: Path, names: list[str], runs: list[dict[str, Any]], seconds: list[float]) -> None:
     """Writes `index.csv`, which depends on the scenes alone, and `times.csv`, which does not."""
     if taken := set(names) & set(RESULTS):
         raise ValueError(f"a parameter has the name of a column of results: {', '.join(sorted(taken))}")
-    _write_rows(folder / "index.csv", names + RESULTS, runs)
+    _write_rows(folder / "index.csv", names + RESULTS + measured(runs, names), runs)
     times = [{"folder": run["folder"], "seconds": time} for run, time in zip(runs, seconds)]
     _write_rows(folder / "times.csv", ["folder", "seconds"], times)
 
@@ -46,7 +52,7 @@ def write_parquet(path: Path, names: list[str], runs: list[dict[str, Any]]) -> N
     def plain(value: Any) -> Any:
         return json.dumps(value) if isinstance(value, (list, dict)) else value
 
-    columns = {name: [plain(run.get(name)) for run in runs] for name in names + RESULTS}
+    columns = {name: [plain(run.get(name)) for run in runs] for name in names + RESULTS + measured(runs, names)}
     part = path.with_suffix(".part")
     pyarrow.parquet.write_table(pyarrow.table(columns), part)
     part.replace(path)
@@ -65,7 +71,8 @@ def write_page(path: Path, names: list[str], runs: list[dict[str, Any]], seconds
     """Writes a page with parameters, results, times and failures."""
     failed = sum(run["status"] != "done" for run in runs)
     total = sum(seconds)
-    columns = names + [name for name in RESULTS if name != "message"] + ["seconds", "message"]
+    results = [name for name in RESULTS if name != "message"]
+    columns = names + results + measured(runs, names) + ["seconds", "message"]
     head = "".join(f"<th>{html.escape(name.replace('_', ' '))}</th>" for name in columns)
     body = "\n".join(_row(columns, run, time) for run, time in zip(runs, seconds))
     slowest = max(seconds, default=0.0)

@@ -241,4 +241,5 @@ def _results(folder: Path) -> dict[str, Any]:
         "crossings": summary["crossings"],
         "obstacle_crossings": summary["obstacle_crossings"],
         "warnings": len(summary["warnings"]),
+        **{name: None if value != value else value for name, value in _energy.measured_at_end(folder)},
     }

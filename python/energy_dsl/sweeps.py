@@ -32,7 +32,8 @@ class Sweep:
 
     folder: Path
     #: One dictionary a run: its parameters, `folder`, `status` ("done" or "failed"), results (`steps`, `frames`,
-    #: `energy` and `kinetic_energy` in J at the end, `crossings`, `obstacle_crossings`, `warnings`), `message`.
+    #: `energy` and `kinetic_energy` in J at the end, `crossings`, `obstacle_crossings`, `warnings`), `message`, and
+    #: forces of pins and strains of garments at the end, such as `pin 0 Fx [N]` and `shirt warp mean`.
     runs: list[dict[str, Any]]
     #: Seconds of each run. A run that was resumed counts from its start to its end, without the pause.
     seconds: list[float]

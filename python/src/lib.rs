@@ -34,6 +34,9 @@ fn _energy(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(simulation::runs::input_files, module)?)?;
     module.add_function(wrap_pyfunction!(simulation::runs::read_scene, module)?)?;
     module.add_function(wrap_pyfunction!(simulation::runs::scene_tables, module)?)?;
+    module.add_function(wrap_pyfunction!(simulation::measured::measurement_columns, module)?)?;
+    module.add_function(wrap_pyfunction!(simulation::measured::measured_at_end, module)?)?;
+    module.add_function(wrap_pyfunction!(simulation::measured::drape, module)?)?;
     module.add_function(wrap_pyfunction!(simulation::runs::version, module)?)?;
     module.add_function(wrap_pyfunction!(tools::audit, module)?)?;
     module.add_function(wrap_pyfunction!(tools::show, module)?)

@@ -78,3 +78,51 @@ def test_ctrl_c_ends_a_run_with_its_results(tmp_path):
     finally:
         signal.signal(signal.SIGINT, handler)
     assert (tmp_path / "out" / "run.json").exists() and ed.resume(tmp_path / "out") == 10
+
+
+PULLED = """
+dt = 0.02
+duration = 0.4
+gravity = [0.0, 0.0, 0.0]
+integrator = "newton"
+contact = "off"
+[[garment]]
+name = "strip"
+mesh.sheet = { cells = [4, 2], size = [0.2, 0.1] }
+fabric = { density = 0.2, material.stvk = { stretch_stiffness = 100.0, poisson_ratio = 0.0 } }
+[[pins]]
+name = "left"
+box = { min = [-0.11, -1.0, -1.0], max = [-0.09, 1.0, 1.0] }
+[[pins]]
+name = "right"
+box = { min = [0.09, -1.0, -1.0], max = [0.11, 1.0, 1.0] }
+motion.keys = [{ time = 0.0 }, { time = 0.3, translate = [0.02, 0.0, 0.0] }]
+"""
+
+
+def test_loads_on_pins_and_strains_are_measured(tmp_path):
+    scene = tmp_path / "pulled.toml"
+    scene.write_text(PULLED)
+    simulation = ed.Simulation(scene)
+    simulation.step(100)
+    reading = simulation.reading()
+    # Uniform stretch by a tenth without coupling: Y (ε + ε²/2)(1 + ε) per width.
+    assert reading["group right Fx [N]"] == pytest.approx(-0.1 * 100 * 0.105 * 1.1, rel=1e-2)
+    assert reading["strip warp mean"] == pytest.approx(0.1, rel=1e-2)
+    assert simulation.pin_forces.shape == (15, 3)
+    assert simulation.pin_forces[:, 0].sum() == pytest.approx(0, abs=1e-2)
+    ed.run(scene, tmp_path / "run")
+    columns = ed.measurements(tmp_path / "run")
+    assert columns["time [s]"][-1] == pytest.approx(0.4)
+    assert columns["pin 1 Fx [N]"][-1] == pytest.approx(reading["pin 1 Fx [N]"], rel=1e-9)
+    with pytest.raises(ed.EnergyError, match="is this the folder of a finished run"):
+        ed.measurements(tmp_path)
+
+
+def test_the_drape_of_a_square_is_that_of_its_shadow():
+    x = np.array([[0.0, 0, 0], [0.2, 0, 0], [0.2, 0.2, -0.1], [0, 0.2, -0.1]])
+    drape = ed.drape(x, [[0, 1, 2], [0, 2, 3]], disc=0.05, specimen=0.15)
+    assert drape["area"] == pytest.approx(0.04, rel=1e-6)
+    assert drape["coefficient"] == pytest.approx(100 * (0.04 / np.pi - 0.05**2) / (0.15**2 - 0.05**2), rel=1e-5)
+    with pytest.raises(ed.EnergyError, match="is not smaller than the specimen"):
+        ed.drape(x, [[0, 1, 2]], disc=0.2, specimen=0.1)

@@ -31,6 +31,9 @@ pub struct OutputChoice {
     pub contact_forces: bool,
     /// `ledger.csv` and `ledger.svg`: energies, work and momenta at each step. Default true.
     pub ledger: bool,
+    /// `measurements.csv`: force, moment and position of each pin, and strain of each garment, at each frame. Default
+    /// true.
+    pub measurements: bool,
     /// `cloth.apng`, an animated PNG of the pictures of frames, which are then written, too. Default false.
     pub apng: bool,
     /// `cloth.mp4`, a film of the pictures of frames, which are then written, too. Needs the program ffmpeg. Default
@@ -100,6 +103,7 @@ impl Default for OutputChoice {
             velocities: false,
             contact_forces: false,
             ledger: true,
+            measurements: true,
             apng: false,
             mp4: false,
             size: [1200, 1000],

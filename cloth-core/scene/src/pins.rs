@@ -14,6 +14,8 @@ use cloth_physics::motion::Motion;
 pub struct Pin {
     /// The pinned vertices, chosen at the start.
     pub choice: PinChoice,
+    /// The name in measurements; `None` for `pin` and the index. Pins with one name form a group.
+    pub name: Option<String>,
     /// The garment or hair to choose from; `None` for the whole scene.
     pub of: Option<String>,
     /// The motion; `None` if the vertices are fixed, or follow an obstacle.
@@ -101,6 +103,8 @@ struct Keys {
     /// `true`: every vertex.
     #[serde(default)]
     all: bool,
+    /// Name in measurements. Pins with the same name form a group, whose forces are added. Default none.
+    name: Option<String>,
     /// Name of the garment or hair to choose from. Default all.
     of: Option<String>,
     /// Motion over time. Default none.
@@ -123,7 +127,8 @@ impl TryFrom<Keys> for Pin {
 
     fn try_from(keys: Keys) -> Result<Self, String> {
         let soft = keys.soft()?;
-        let Keys { vertex, vertices, inside, nearest, group, boundary, all, of, motion, obstacle, release, .. } = keys;
+        let Keys { vertex, vertices, inside, nearest, group, boundary, all, name, .. } = keys;
+        let Keys { of, motion, obstacle, release, .. } = keys;
         if let Some(PinBox { min, max }) = inside
             && let Some(axis) = (0..3).find(|&axis| min[axis] > max[axis])
         {
@@ -146,7 +151,7 @@ impl TryFrom<Keys> for Pin {
         ];
         let mut given = choices.into_iter().flatten();
         match (given.next(), given.next()) {
-            (Some(choice), None) => Ok(Self { choice, of, motion, obstacle, soft, release }),
+            (Some(choice), None) => Ok(Self { choice, name, of, motion, obstacle, soft, release }),
             _ => {
                 let expected = "`vertex`, `vertices`, `box`, `nearest`, `group`, `boundary` and `all`";
                 Err(format!("expected exactly one of {expected}"))
@@ -177,6 +182,6 @@ impl Pin {
     /// Creates a fixed pin that chooses from the whole scene.
     #[must_use]
     pub fn fixed(choice: PinChoice) -> Self {
-        Self { choice, of: None, motion: None, obstacle: None, soft: None, release: None }
+        Self { choice, name: None, of: None, motion: None, obstacle: None, soft: None, release: None }
     }
 }

@@ -7,11 +7,13 @@ pub mod demo;
 pub mod fabrics;
 pub mod manual;
 pub mod materials;
+pub mod measure;
 pub mod report;
 pub mod resume;
 pub mod run;
 pub mod schema;
 pub mod sweep;
+pub mod test;
 pub mod validate;
 pub mod view;
 

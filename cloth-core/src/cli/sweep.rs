@@ -118,11 +118,28 @@ impl Sweep {
         }
     }
 
+    /// Returns the forces of pins and the strains of garments at the end of each run, by column; none if it failed.
+    fn measured(&self, choices: &[Choice], failures: &[Option<String>]) -> Result<Vec<Vec<(String, f64)>>> {
+        let of_run = |(choice, failure): (&Choice, &Option<String>)| match failure {
+            Some(_) => Ok(Vec::new()),
+            None => Ok(Record::read(&self.output.join(&choice.name))?.measurements.at_end()),
+        };
+        choices.iter().zip(failures).map(of_run).collect()
+    }
+
     /// Writes the index, which depends on the scenes alone, and the times, which do not.
     fn write_index(&self, keys: &[&str], choices: &[Choice], failures: &[Option<String>]) -> Result<()> {
-        let head = keys.iter().copied().chain(COLUMNS).map(cell).collect::<Vec<_>>().join(",");
+        let measured = self.measured(choices, failures)?;
+        let mut names: Vec<&str> = Vec::new();
+        for (name, _) in measured.iter().flatten() {
+            if !names.contains(&name.as_str()) {
+                names.push(name);
+            }
+        }
+        let head = keys.iter().copied().chain(COLUMNS).chain(names.iter().copied()).map(cell);
+        let head = head.collect::<Vec<_>>().join(",");
         let (mut index, mut times) = (format!("{head}\n"), "folder,seconds\n".to_owned());
-        for (choice, failure) in choices.iter().zip(failures) {
+        for ((choice, failure), measured) in choices.iter().zip(failures).zip(&measured) {
             let values = choice.values.iter().map(|value| match value {
                 Value::String(text) => cell(text),
                 value => cell(&value.to_string()),
@@ -134,7 +151,11 @@ impl Sweep {
                 }
                 None => results(&self.output.join(&choice.name))?,
             };
-            let row: Vec<String> = values.chain([choice.name.clone()]).chain(results).collect();
+            let numbers = names.iter().map(|wanted| {
+                let found = measured.iter().find(|(name, number)| name == wanted && !number.is_nan());
+                found.map_or(String::new(), |(_, number)| number.to_string())
+            });
+            let row: Vec<String> = values.chain([choice.name.clone()]).chain(results).chain(numbers).collect();
             let _ = writeln!(index, "{}", row.join(","));
             let _ = writeln!(times, "{},{seconds}", choice.name);
         }
@@ -155,7 +176,7 @@ const LOCK: &str = "cloth.lock";
 const INDEX: &str = "index.csv";
 /// A file in the folder of a run that was completed.
 const DONE: &str = "sweep.done";
-/// Columns of the index after those of the parameters.
+/// Columns of the index after those of the parameters, and before those of measurements.
 const COLUMNS: [&str; 10] = [
     "folder",
     "status",

@@ -10,7 +10,7 @@ use energy_solve::{DissipationTerm, DrivenTerm, ElementList, ListError, Potentia
 use super::closing_seam::ClosingSeam;
 use super::exclusions::{self, ExclusionError, Referents};
 use super::inflation::{self, PressureLaw};
-use super::parts::{IslandModel, Model, ModelError, MovingPin, Part, PartKind, TermLabel, UnknownPart};
+use super::parts::{IslandModel, Model, ModelError, MovingPin, Part, PartKind, PinnedVertices, TermLabel, UnknownPart};
 use super::seam::Side;
 use super::soft_pin::{Held, SoftPinTerm};
 use super::{PinError, SeamError, pins, seam};
@@ -386,9 +386,11 @@ impl<'a> Builder<'a> {
 
     fn pin(&mut self) -> Result<(), ModelError> {
         let mut held: BTreeMap<usize, Attachment> = BTreeMap::new();
+        let mut owned = BTreeSet::new();
         for (pin, description) in self.scene.pins.iter().enumerate() {
             let motion = self.motion_of(pin, description)?;
             let chosen = self.chosen(pin, description)?;
+            self.model.pins.push(PinnedVertices::of(description.name.clone(), &chosen));
             if let Some(soft) = &description.soft {
                 self.add_soft_pin(pin, soft, motion, &chosen);
                 continue;
@@ -402,11 +404,15 @@ impl<'a> Builder<'a> {
                 if !self.move_alike(known, attachment) {
                     return Err(PinError::Twice { pin, vertex }.into());
                 }
+                if description.release.is_none_or(|release| release > self.time) && owned.insert(vertex) {
+                    self.model.pins[pin].held.push(vertex);
+                }
                 // The last pin to let go frees the vertex.
                 let release = known.release.zip(attachment.release).map(|(one, other)| one.max(other));
                 held.insert(vertex, Attachment { release, ..known });
             }
         }
+        self.model.pins.iter_mut().for_each(|pin| pin.held.sort_unstable());
         for vertex in self.roots() {
             held.entry(vertex).or_insert(Attachment { motion: None, follows: false, release: None }).release = None;
         }
@@ -489,6 +495,7 @@ impl<'a> Builder<'a> {
         for (island, held) in held {
             self.add_term(island, since, Box::new(SoftPinTerm::new(pin, held, motion.clone(), *release)));
         }
+        self.model.pins[pin].springs = (since..self.model.labels.len()).collect();
     }
 
     fn chosen(&self, pin: usize, description: &Pin) -> Result<Vec<usize>, PinError> {

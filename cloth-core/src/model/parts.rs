@@ -1,6 +1,6 @@
 //! The parts of a scene and the assembled model.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 
 use energy_dsl::Vector3;
@@ -60,6 +60,27 @@ pub struct MovingPin {
     pub motion: usize,
 }
 
+/// The vertices of an entry of `[[pins]]`.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct PinnedVertices {
+    /// The name, which pins of a group share; `None` without one.
+    pub name: Option<String>,
+    /// All vertices that the pin chose, ascending.
+    pub chosen: Vec<usize>,
+    /// Vertices that it holds exactly now, ascending. A vertex of several pins belongs to the first one that
+    /// holds it.
+    pub held: Vec<usize>,
+    /// Labels of its springs; empty if it holds exactly.
+    pub springs: Vec<usize>,
+}
+
+impl PinnedVertices {
+    pub(super) fn of(name: Option<String>, chosen: &[usize]) -> Self {
+        let chosen: Vec<usize> = BTreeSet::from_iter(chosen.iter().copied()).into_iter().collect();
+        Self { name, chosen, ..Self::default() }
+    }
+}
+
 /// A set of vertices that no force couples to the others, with the forces on them.
 #[derive(Debug, Default)]
 pub struct IslandModel {
@@ -99,6 +120,8 @@ pub struct Model {
     pub pinned_at_start: Vec<bool>,
     /// Whether each vertex is pinned and never released.
     pub pinned_forever: Vec<bool>,
+    /// The vertices of each entry of `[[pins]]`.
+    pub pins: Vec<PinnedVertices>,
     /// Pinned vertices that move.
     pub moving: Vec<MovingPin>,
     /// The motions of pins.

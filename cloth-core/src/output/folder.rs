@@ -43,7 +43,8 @@ fn is_there(path: &Path) -> bool {
 }
 
 /// The output folder of a run: `cloth.png`, `cloth.glb`, `cloth.usda`, `ledger.csv`, `ledger.svg`, `contact.svg`,
-/// `summary.txt`, `run.json`, `frames/cloth_0000.obj`, … and the checkpoint. Files are written atomically.
+/// `measurements.csv`, `summary.txt`, `run.json`, `frames/cloth_0000.obj`, … and the checkpoint. Files are
+/// written atomically.
 #[derive(Clone, Debug)]
 pub struct OutputFolder {
     path: PathBuf,
@@ -69,6 +70,8 @@ impl OutputFolder {
     pub const LEDGER_PLOT: &'static str = "ledger.svg";
     /// Plot of the forces of contact.
     pub const CONTACT_PLOT: &'static str = "contact.svg";
+    /// File name of the loads on pins and the strains of garments.
+    pub const MEASUREMENTS: &'static str = "measurements.csv";
     /// File name of the machine-readable record.
     pub const RECORD: &'static str = "run.json";
     /// File name of the report.
@@ -87,7 +90,7 @@ impl OutputFolder {
     pub const FRAMES: &'static str = "frames";
 
     /// All files of a run except the frames.
-    const RESULTS: [&'static str; 14] = [
+    const RESULTS: [&'static str; 15] = [
         Self::PICTURE,
         Self::ANIMATION,
         Self::SUMMARY,
@@ -97,6 +100,7 @@ impl OutputFolder {
         Self::LEDGER,
         Self::LEDGER_PLOT,
         Self::CONTACT_PLOT,
+        Self::MEASUREMENTS,
         Self::RECORD,
         Self::REPORT,
         Self::CHECKPOINT,

@@ -4,6 +4,7 @@ use energy_files::InputFile;
 use energy_files::sealed::{Seal, SealError};
 use serde::{Deserialize, Serialize};
 
+use crate::measure::Measurements;
 use crate::simulation::{RestoreError, SavedState};
 
 const SEAL: Seal = Seal { keyword: "cloth-checkpoint", version: Checkpoint::VERSION };
@@ -27,6 +28,8 @@ pub struct Checkpoint {
     pub frames: usize,
     /// CRC-32 of these frames.
     pub frames_checksum: u32,
+    /// The readings of pins and garments so far.
+    pub measurements: Measurements,
     /// The state of the simulation.
     pub state: SavedState,
 }
@@ -77,7 +80,7 @@ impl CheckpointError {
 
 impl Checkpoint {
     /// The version that this program reads and writes.
-    pub const VERSION: u32 = 4;
+    pub const VERSION: u32 = 5;
 
     /// Encodes the checkpoint as the contents of a file: a line of text with version, length and checksum, then JSON
     /// with exact numbers.

@@ -7,6 +7,8 @@ use crate::scene::{ContactChoice, Mesh, Scene};
 
 /// Bytes of an OBJ file per vertex, with its share of faces: a short line each.
 const FILE_BYTES_PER_VERTEX: f64 = 60.0;
+/// Bytes of a pin or a garment in one reading, with its part of the file.
+const READING: f64 = 500.0;
 /// Bytes per entry of the ledger, one per step.
 const LEDGER_ENTRY: f64 = 400.0;
 
@@ -48,8 +50,14 @@ impl MemoryNeed {
         } else {
             24.0
         };
+        let readings = frames * (READING * (scene.pins.len() + scene.garments.len()) as f64);
         let ledger = if wanted.ledger { LEDGER_ENTRY * steps } else { 0.0 };
-        Self { vertices, frames, simulation: per_vertex * vertices + ledger, output: per_point * vertices * frames }
+        Self {
+            vertices,
+            frames,
+            simulation: per_vertex * vertices + ledger + readings,
+            output: per_point * vertices * frames,
+        }
     }
 
     /// The total, in bytes.

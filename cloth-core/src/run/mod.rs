@@ -11,6 +11,7 @@ mod memory_need;
 mod progress;
 mod progress_lines;
 mod record;
+mod recorded_frame;
 mod report;
 mod results;
 pub mod stats;
@@ -27,10 +28,12 @@ pub use forecast::Forecast;
 pub use memory_need::MemoryNeed;
 pub use progress::{Log, Progress};
 pub use record::{Record, RecordError};
+pub use recorded_frame::{FrameError, read_frame};
 pub use report::{ReportError, write_report};
 pub use results::Ending;
 
 use crate::integrator::StepReport;
+use crate::measure::{Measurements, Reading};
 use crate::output::{AnimationError, OutputError, OutputFolder, PictureError, Scenery};
 use crate::scene::{Scene, SceneError};
 use crate::simulation::{Simulation, SimulationError};
@@ -115,6 +118,7 @@ pub struct Run {
     folder: OutputFolder,
     simulation: Simulation,
     frames: FrameStore,
+    measurements: Measurements,
     /// Pictures of the frames; `None` before the first step, or if the scene does not want them.
     pictures: Option<FramePictures>,
     /// The largest number of threads.
@@ -159,6 +163,7 @@ impl Run {
             text,
             path: path.to_owned(),
             folder,
+            measurements: simulation.measurements(),
             simulation,
             frames: FrameStore::new(saved, &scene.output)?,
             pictures: None,
@@ -244,6 +249,7 @@ impl Run {
             folder,
             simulation,
             frames,
+            measurements: saved.measurements,
             pictures: None,
             threads: available_threads(),
             checkpoint_interval: Some(saved.every),
@@ -360,6 +366,8 @@ impl Run {
             pictures.add(Frame::clone(&frame))?;
         }
         self.frames.add(frame, &vectors)?;
+        // JSON has no infinite forces; such a run is about to fail.
+        self.measurements.readings.extend(Some(self.simulation.reading()).filter(Reading::is_finite));
         Ok(())
     }
 
@@ -373,6 +381,7 @@ impl Run {
             every: self.checkpoint_interval.unwrap_or(u64::MAX),
             frames: self.frames.frames().len(),
             frames_checksum: self.frames.checksum(),
+            measurements: self.measurements.clone(),
             state: self.simulation.save(),
         };
         self.folder.write_checkpoint(&checkpoint.to_bytes()?)?;

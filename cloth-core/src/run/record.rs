@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
+use crate::measure::Measurements;
 use crate::output::OutputFolder;
 use crate::simulation::Summary;
 
@@ -25,6 +26,10 @@ pub struct Record {
     pub frames: usize,
     /// Totals and final state.
     pub summary: Summary,
+    /// The readings of pins and garments: one per frame, or fewer if they were too many; the first and the last always.
+    /// No pins and no garments if an earlier version wrote the record.
+    #[serde(default)]
+    pub measurements: Measurements,
 }
 
 impl Record {

@@ -7,6 +7,9 @@ use super::{Record, Run, RunError, stats};
 use crate::output::{OutputFolder, Show, animation_glb, mdd_bytes, pc2_bytes, usd_text};
 use crate::simulation::{SimulationError, Summary};
 
+/// The largest number of loads on pins in the record; the file of measurements has all.
+const MOST_LOADS: usize = 100_000;
+
 /// The outcome of a run.
 #[derive(Debug)]
 pub struct Ending {
@@ -67,6 +70,9 @@ impl Run {
         let summary = self.summary_of_good_steps(failure.as_ref())?;
         written.add(true, || self.write_summary(&summary));
         written.add(true, || self.write_record(&summary));
+        written.add(self.scene.output.measurements, || {
+            self.write(OutputFolder::MEASUREMENTS, self.measurements.csv().as_bytes())
+        });
         self.write_ledger(&mut written);
         self.write_shows(&mut written);
         if let Some(mut pictures) = self.pictures.take() {
@@ -111,7 +117,8 @@ impl Run {
         let (scene, path) = (self.text.clone(), self.absolute_path());
         let (version, frames) = (Record::VERSION, self.frames.frames().len());
         let finished = self.simulation.is_finished();
-        let record = Record { version, scene, path, finished, frames, summary: summary.clone() };
+        let (summary, measurements) = (summary.clone(), self.measurements.thinned(MOST_LOADS));
+        let record = Record { version, scene, path, finished, frames, summary, measurements };
         self.write(OutputFolder::RECORD, &serde_json::to_vec_pretty(&record)?)
     }
 

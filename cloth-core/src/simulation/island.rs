@@ -341,6 +341,17 @@ impl Island {
         }
     }
 
+    /// Writes the accelerations of pinned vertices in the last step, given the velocities of the scene before it in
+    /// m/s, to `accelerations` of the scene, in m/s². An island that fell asleep has none.
+    pub(super) fn note_accelerations(&self, before: &[Vector3<f64>], dt: f64, accelerations: &mut [Vector3<f64>]) {
+        for (local, &vertex) in self.vertices.iter().enumerate() {
+            if self.body.system.dofs().row(local).is_none() {
+                let change = |axis: usize| (self.body.v[local][axis] - before[vertex][axis]) / dt;
+                accelerations[vertex] = if self.is_asleep() { [0.0; 3] } else { std::array::from_fn(change) };
+            }
+        }
+    }
+
     /// Copies positions and velocities to the scene.
     pub(super) fn scatter(&self, x: &mut [Vector3<f64>], v: &mut [Vector3<f64>]) {
         for (local, &vertex) in self.vertices.iter().enumerate() {

@@ -7,6 +7,7 @@ mod island;
 mod obstacle_crossings;
 mod open;
 mod prescribed;
+mod reading;
 mod release;
 mod saved;
 mod sleep;
@@ -34,8 +35,9 @@ use crate::collision::{CollisionMesh, Crossing, Exclusions, crossings};
 use crate::contact::Obstacle;
 use crate::integrator::{StepError, StepReport};
 use crate::ledger::Ledger;
+use crate::measure::StrainGauge;
 use crate::mesh::TriangleMesh;
-use crate::model::{Model, ModelError, MovingPin, Part, PartKind, TermLabel};
+use crate::model::{Model, ModelError, MovingPin, Part, PartKind, PinnedVertices, TermLabel};
 use crate::motion::Motion;
 use crate::scene::{ContactChoice, Scene};
 use collision::add_contact;
@@ -120,6 +122,15 @@ pub struct Simulation {
     v: Vec<Vector3<f64>>,
     masses: Vec<f64>,
     pinned: Vec<bool>,
+    pins: Vec<PinnedVertices>,
+    /// The strain gauge of each garment.
+    gauges: Vec<StrainGauge>,
+    /// Accelerations of pinned vertices in the last step, in m/s²; zero before the first one.
+    accelerations: Vec<Vector3<f64>>,
+    /// Acceleration of gravity, in m/s².
+    gravity: Vector3<f64>,
+    /// Drag per mass, in 1/s.
+    drag: f64,
     islands: Vec<Island>,
     labels: Vec<TermLabel>,
     may_sleep: bool,
@@ -169,7 +180,8 @@ impl Simulation {
         let collision_mesh = collision::mesh_of(&model);
         let prescribed = Prescribed::new(&model.obstacles);
         let obstacle_mesh = collision_mesh.clone().with_obstacles(&prescribed.cores());
-        let Model { parts, x, v, masses, triangles, pinned, motions, labels, obstacles, exclusions, .. } = model;
+        let gauges = reading::gauges(scene, &model);
+        let Model { parts, x, v, masses, triangles, pinned, pins, motions, labels, obstacles, exclusions, .. } = model;
         let mut simulation = Self {
             parts,
             triangles,
@@ -181,6 +193,11 @@ impl Simulation {
             prescribed,
             exclusions,
             contact: scene.contact,
+            accelerations: vec![[0.0; 3]; x.len()],
+            pins,
+            gauges,
+            gravity: scene.gravity,
+            drag: scene.drag,
             x,
             v,
             masses,
@@ -380,7 +397,7 @@ impl Simulation {
     /// Steps the islands that are awake and returns how many sleep. Positions, velocities and the ledger change only
     /// after every island has succeeded.
     fn step_islands(&mut self, step: u64) -> Result<(StepReport, u64), StepError> {
-        let Self { islands, x, v, ledger, obstacles, summary, contact, .. } = self;
+        let Self { islands, x, v, ledger, obstacles, summary, contact, accelerations, .. } = self;
         let context = StepContext::new(step, self.dt, &self.motions, obstacles, self.may_sleep);
         let (mut total, mut slept) = (StepReport::default(), 0);
         for (number, island) in islands.iter_mut().enumerate() {
@@ -406,6 +423,7 @@ impl Simulation {
                 passage.into_iter().for_each(|passage| summary.totals.note(passage));
             }
             island.keep_step();
+            island.note_accelerations(v, context.dt, accelerations);
             island.scatter(x, v);
         }
         ledger.iter_mut().for_each(|ledger| ledger.enter(context.end));

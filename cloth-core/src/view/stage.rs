@@ -1,4 +1,4 @@
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
 
 use energy_dsl::Vector3;
@@ -7,14 +7,12 @@ use super::colouring::{Colouring, RestShape, stored_energies};
 use super::grip::Grip;
 use crate::geometry::{norm, subtract};
 use crate::model::{Model, ModelError};
-use crate::output::OutputFolder;
-use crate::run::{Record, RecordError};
+use crate::run::{FrameError, Record, RecordError, read_frame};
 use crate::scene::{Scene, SceneError};
 use crate::simulation::{Extension, Simulation, SimulationError};
 
 /// A scene or run that cannot be viewed.
 #[derive(Debug, thiserror::Error)]
-#[expect(missing_docs, reason = "the messages name the fields")]
 #[non_exhaustive]
 pub enum ViewError {
     /// The scene file is invalid.
@@ -30,20 +28,8 @@ pub enum ViewError {
     #[error(transparent)]
     Record(#[from] RecordError),
     /// A frame cannot be read.
-    #[error(
-        "cannot read {}; frames are shown from OBJ files: was the run made with `output.obj = false`?",
-        .path.display()
-    )]
-    Frame { path: PathBuf, source: std::io::Error },
-    /// A frame does not fit the scene.
-    #[error("{} is damaged: it has {found} vertices, the scene {expected}", .path.display())]
-    Damaged {
-        path: PathBuf,
-        /// Number of vertices in the file.
-        found: usize,
-        /// Vertices of the scene.
-        expected: usize,
-    },
+    #[error(transparent)]
+    Frame(#[from] FrameError),
     /// The requested frame or time is not part of the run.
     #[error("the run has frames 0 to {last}, up to {end:.4} s; {asked} is not among them")]
     NoSuchFrame {
@@ -335,24 +321,6 @@ impl Stage {
             self.simulation.wake(vertex);
         }
     }
-}
-
-/// The largest file of a frame, in bytes.
-const LARGEST_FRAME: u64 = 1 << 30;
-
-/// Reads the vertices of a frame that `cloth run` wrote.
-fn read_frame(folder: &Path, number: usize, expected: usize) -> Result<Vec<Vector3<f64>>, ViewError> {
-    let path = folder.join(OutputFolder::FRAMES).join(format!("cloth_{number:04}.obj"));
-    let text = energy_files::read_state(&path, LARGEST_FRAME).and_then(energy_files::utf8);
-    let text = text.map_err(|source| ViewError::Frame { path: path.clone(), source })?;
-    let vertex = |line: &str| -> Option<Vector3<f64>> {
-        let mut numbers =
-            line.strip_prefix("v ")?.split(' ').map_while(|word| word.parse().ok().filter(|x: &f64| x.is_finite()));
-        Some([numbers.next()?, numbers.next()?, numbers.next()?])
-    };
-    let vertices: Vec<Vector3<f64>> = text.lines().filter_map(vertex).collect();
-    let found = vertices.len();
-    if found == expected { Ok(vertices) } else { Err(ViewError::Damaged { path, found, expected }) }
 }
 
 #[cfg(test)]

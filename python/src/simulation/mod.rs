@@ -1,5 +1,6 @@
 //! Scenes of cloth: stepped by hand, with everything that a program controls, or run to an output folder.
 
+pub mod measured;
 mod own;
 pub mod runs;
 
