@@ -4,6 +4,7 @@ use serde::Deserialize;
 use super::Declared;
 use super::plate::Rigidity;
 use super::warp_choice::WarpChoice;
+use super::yarns::Yarns;
 use crate::bounded::{AboveOne, MaybeReal, NonNegative, PoissonRatio, Positive, Real, Reals};
 use crate::mesh::Warp;
 
@@ -21,7 +22,8 @@ pub struct Fabric {
     #[serde(default, with = "Real::<NonNegative>")]
     pub friction: f64,
     /// Resistance to stretching and bending: the table `mass-spring`, `stvk`, `neo-hookean`, `stable-neo-hookean`,
-    /// `stable-neo-hookean-log`, `arap`, `baraff-witkin`, `orthotropic-stvk`, or `file` for elements of your own.
+    /// `stable-neo-hookean-log`, `arap`, `baraff-witkin`, `orthotropic-stvk`, `yarns`, or `file` for elements of your
+    /// own.
     pub material: Material,
     /// Direction of the warp in the rest shape, projected onto each triangle; or `uv`, the direction in which the first
     /// texture coordinate of the OBJ file grows. Default [1, 0, 0].
@@ -126,6 +128,8 @@ pub enum Material {
     BaraffWitkin(BaraffWitkin),
     /// Woven St. Venant–Kirchhoff triangles, from tensile tests of strips along warp, weft and bias.
     OrthotropicStvk(Woven),
+    /// Two families of yarns that stiffen when stretched, from the numbers of KES or FAST testers or from curves.
+    Yarns(Yarns),
     /// Elements declared in your own `.energy` file.
     File(Declared),
 }

@@ -10,6 +10,7 @@ mod plasticity;
 pub mod plate;
 mod terms;
 mod warp_choice;
+mod yarns;
 
 pub use damping::StitchDamping;
 pub use declared::{Declared, DeclaredError};
@@ -22,3 +23,4 @@ pub use library::{MEASURED, MeasuredFabric};
 pub use plate::{PlateTerm, Rigidity};
 pub use terms::{FabricTerms, Surroundings, SystemPart, terms, terms_at};
 pub use warp_choice::MaybeWarpChoice;
+pub use yarns::{Compression, Fast, Kes, Shear, StiffeningCurve, Tension, TensionLaw, YarnError, YarnLaw, Yarns};

@@ -124,6 +124,12 @@ pub fn terms_at(
             })?;
             ((c_uv, c_ss), Some(&material.bending))
         }
+        Material::Yarns(material) => {
+            let law = material.law()?;
+            terms.warnings.extend(law.warnings(&terms.part.prefix));
+            terms.add_membrane("membrane", false, &cloth, move |triangle| law.element(triangle))?;
+            ((law.coupling, law.shear.k), Some(&material.bending))
+        }
         Material::File(declared) => {
             terms.add_declared(declared, &cloth, fabric.density)?;
             ((0.0, 0.0), Some(&declared.bending))
@@ -161,6 +167,7 @@ fn check_plasticity(fabric: &Fabric) -> Result<(), FabricError> {
         Material::Arap(material) => Some(&material.bending),
         Material::BaraffWitkin(material) => Some(&material.bending),
         Material::OrthotropicStvk(material) => Some(&material.bending),
+        Material::Yarns(material) => Some(&material.bending),
         Material::File(material) => Some(&material.bending),
     };
     let can_fold = matches!(bending, Some(Bending::Plate(_) | Bending::Bridson { .. }));
@@ -169,7 +176,10 @@ fn check_plasticity(fabric: &Fabric) -> Result<(), FabricError> {
 
 /// Maps every triangle to its plane; with the first axis along the warp if the fabric depends on it.
 fn material_triangles(mesh: &TriangleMesh, fabric: &Fabric) -> Result<Vec<MaterialTriangle>, ThreadError> {
-    let woven = matches!(fabric.material, Material::BaraffWitkin(_) | Material::OrthotropicStvk(_) | Material::File(_));
+    let woven = matches!(
+        fabric.material,
+        Material::BaraffWitkin(_) | Material::OrthotropicStvk(_) | Material::Yarns(_) | Material::File(_)
+    );
     let all = 0..mesh.triangles().len();
     if !woven && fabric.strain_limit.is_none() {
         return Ok(all.map(|triangle| material_triangle(mesh.corners(triangle))).collect());
