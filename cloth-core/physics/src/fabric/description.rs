@@ -5,6 +5,7 @@ use super::Declared;
 use super::plate::Rigidity;
 use super::warp_choice::WarpChoice;
 use super::yarns::Yarns;
+use crate::Coulomb;
 use crate::bounded::{AboveOne, MaybeReal, NonNegative, PoissonRatio, Positive, Real, Reals};
 use crate::mesh::Warp;
 
@@ -18,9 +19,10 @@ pub struct Fabric {
     /// Thickness in contact with cloth, in m. Default `density` over 470 kg/m³, the bulk density of plain cotton.
     #[serde(default, with = "MaybeReal::<Positive>")]
     pub thickness: Option<f64>,
-    /// Coefficient of friction with cloth; between two fabrics, the mean of theirs. Default 0.
-    #[serde(default, with = "Real::<NonNegative>")]
-    pub friction: f64,
+    /// Friction with cloth: a coefficient, or the table `static`, `kinetic`; between two fabrics, the means of theirs.
+    /// Default 0.
+    #[serde(default)]
+    pub friction: Coulomb,
     /// Resistance to stretching and bending: the table `mass-spring`, `stvk`, `neo-hookean`, `stable-neo-hookean`,
     /// `stable-neo-hookean-log`, `arap`, `baraff-witkin`, `orthotropic-stvk`, `yarns`, or `file` for elements of your
     /// own.
@@ -38,6 +40,9 @@ pub struct Fabric {
     /// Limits beyond which the cloth stays deformed. Default none.
     #[serde(default)]
     pub plasticity: Option<Plasticity>,
+    /// Friction between yarns that bend. Default none.
+    #[serde(default)]
+    pub hysteresis: Option<Hysteresis>,
 }
 
 impl Fabric {
@@ -47,12 +52,13 @@ impl Fabric {
         Self {
             density,
             thickness: None,
-            friction: 0.0,
+            friction: Coulomb::default(),
             material,
             warp: first_axis(),
             strain_limit: None,
             rayleigh: None,
             plasticity: None,
+            hysteresis: None,
         }
     }
 
@@ -105,6 +111,23 @@ pub struct Plasticity {
     /// The largest change of a curvature relative to the rest shape, in 1/m. Default unlimited.
     #[serde(default, with = "MaybeReal::<Positive>")]
     pub curvature: Option<f64>,
+}
+
+/// Friction between yarns that bend: a second plate, in parallel to the bending resistance, that is elastic up to a
+/// moment and yields there. So the curve of moment over curvature is a loop of this half width.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Hysteresis {
+    /// The largest moment per width, in N: half of what KES-F bending testers print as 2HB (1 gf·cm/cm is 9.807 mN).
+    #[serde(with = "Real::<Positive>")]
+    pub moment: f64,
+    /// The change of curvature after which the moment is reached, in 1/m. Default 20.
+    #[serde(default = "yield_curvature", with = "Real::<Positive>")]
+    pub curvature: f64,
+}
+
+fn yield_curvature() -> f64 {
+    20.0
 }
 
 /// Resistance to stretching and bending.

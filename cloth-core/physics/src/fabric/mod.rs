@@ -15,11 +15,12 @@ mod yarns;
 pub use damping::StitchDamping;
 pub use declared::{Declared, DeclaredError};
 pub use description::{
-    Arap, BaraffWitkin, Bending, Fabric, MassSpring, Material, Membrane, Plasticity, Rayleigh, StrainLimit, Woven,
+    Arap, BaraffWitkin, Bending, Fabric, Hysteresis, MassSpring, Material, Membrane, Plasticity, Rayleigh, StrainLimit,
+    Woven,
 };
 pub use error::FabricError;
 pub use hair::{Hair, hair_terms};
-pub use library::{MEASURED, MeasuredFabric};
+pub use library::{LIBRARY, LibraryFabric, UnknownFabric, in_library};
 pub use plate::{PlateTerm, Rigidity};
 pub use terms::{FabricTerms, Surroundings, SystemPart, terms, terms_at};
 pub use warp_choice::MaybeWarpChoice;

@@ -11,7 +11,7 @@ use super::declared::{Declared, TargetMesh};
 use super::error::FabricError;
 use super::plasticity::{PlasticHinges, PlasticMembrane, angle_of_curvature};
 use super::plate::{PlateTerm, Rigidity, ThreadError};
-use super::{Bending, Fabric, MassSpring, Material, Plasticity, Rayleigh, StrainLimit};
+use super::{Bending, Fabric, Hysteresis, MassSpring, Material, Plasticity, Rayleigh, StrainLimit};
 use crate::geometry::{cross, norm, subtract};
 use crate::mesh::{
     Hinge, MaterialTriangle, SpringNetwork, Topology, TriangleMesh, Warp, lumped_masses, material_triangle, rest_angle,
@@ -140,6 +140,9 @@ pub fn terms_at(
     }
     if let Some(bending) = bending {
         terms.add_bending(bending, &cloth)?;
+    }
+    if let Some(hysteresis) = &fabric.hysteresis {
+        terms.add_hysteresis(hysteresis, &cloth)?;
     }
     if let Some(rayleigh) = &fabric.rayleigh {
         terms.add_rayleigh(rayleigh, stiffness, bending.unwrap_or(&Bending::None), &cloth)?;
@@ -415,6 +418,17 @@ impl FabricTerms {
                 self.add_force("bending", &stencils, hinges.iter().map(element).collect())
             }
         }
+    }
+
+    fn add_hysteresis(&mut self, hysteresis: &Hysteresis, cloth: &MaterialMesh<'_>) -> Result<(), FabricError> {
+        let Hysteresis { moment, curvature } = *hysteresis;
+        let rigidity = Rigidity::Flexural { rigidity: moment / curvature, poisson_ratio: 0.0 };
+        let plate = PlateTerm::new(self.named("bending hysteresis"), cloth.mesh, &rigidity, cloth.warp)?;
+        if !self.leave_out("bending hysteresis", false, plate.triangles()) {
+            let plate = plate.with_plastic_curvature(moment);
+            self.terms.push(Box::new(plate.on_vertices_from(self.part.first)));
+        }
+        Ok(())
     }
 
     pub(super) fn add_surroundings(&mut self, surroundings: &Surroundings) -> Result<(), FabricError> {
