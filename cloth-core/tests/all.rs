@@ -34,3 +34,4 @@ mod stress;
 mod threads;
 mod untangling;
 mod view;
+mod yarns;

@@ -153,3 +153,64 @@ fn fitted(
     let curve = StiffeningCurve::fitted(points);
     Ok((curve, curve.misfit(points)))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The work until a strain, over half of load times strain.
+    fn linearity(curve: &StiffeningCurve, strain: f64, load: f64) -> f64 {
+        let steps = 10_000;
+        let width = strain / f64::from(steps);
+        let work: f64 = (0..steps).map(|i| width * curve.tension((f64::from(i) + 0.5) * width)).sum();
+        2.0 * work / (load * strain)
+    }
+
+    #[test]
+    fn kes_numbers_are_reproduced_with_the_third_and_the_fifth_power() {
+        for (emt, lt, load) in [(0.047, 0.6, 490.3), (0.07, 1.0, 490.3), (0.3, 0.45, 49.0), (0.12, 0.5, 490.3)] {
+            let (curve, misfit) = Tension::Kes(Kes { emt, lt, load }).curve("warp").unwrap();
+            assert!((curve.tension(emt) / load - 1.0).abs() < 1e-12 && misfit == 0.0);
+            assert!((linearity(&curve, emt, load) - lt).abs() < 1e-6, "{lt}: {}", linearity(&curve, emt, load));
+            assert!(curve.k > 0.0 && curve.a >= 0.0 && curve.b >= 0.0, "{curve:?}");
+        }
+    }
+
+    #[test]
+    fn fast_numbers_are_three_points_of_a_curve() {
+        let truth = StiffeningCurve { k: 900.0, a: 2e5, b: 0.0, m: 0.07 };
+        // The strains at the three loads, by bisection.
+        let strain = |load: f64| {
+            let halve = |(low, high): (f64, f64), _: i32| {
+                let middle = 0.5 * (low + high);
+                if truth.tension(middle) < load { (middle, high) } else { (low, middle) }
+            };
+            (0..60).fold((0.0, 0.2), halve).0
+        };
+        let [e5, e20, e100] = [4.903_325, 19.6133, 98.0665].map(strain);
+        let (curve, misfit) = Tension::Fast(Fast { e5, e20, e100 }).curve("weft").unwrap();
+        assert!(misfit < 1e-9 && (curve.k / truth.k - 1.0).abs() < 1e-6, "{curve:?} {misfit}");
+    }
+
+    #[test]
+    fn numbers_that_no_law_has_are_refused_with_a_remedy() {
+        let kes = |lt| Tension::Kes(Kes { emt: 0.05, lt, load: 490.0 });
+        let law = |tension| Tension::Law(TensionLaw { modulus: 1000.0, strain: 0.1, tension });
+        let curve = |points: &[[f64; 2]]| Tension::Curve(points.to_vec());
+        for (tension, message) in [
+            (kes(1.0 / 3.0), "warp.kes.lt: expected a linearity above 1/3"),
+            (kes(1.2), "got 1.2; give points of the curve as `warp.curve`"),
+            (law(99.0), "warp.law: expected a tension of at least modulus × strain = 100.0000 N/m, got 99"),
+            (curve(&[]), "warp.curve: expected at least one point"),
+            (curve(&[[0.1, 5.0], [0.2, 4.0]]), "warp.curve: point 2 [0.2, 4.0] must exceed point 1 [0.1, 5.0]"),
+            (curve(&[[0.1, 5.0], [0.1, 6.0]]), "sort the points"),
+            (curve(&[[1.0, 5.0], [7.1, 490.0]]), "expected strains of at most 2, got 7.1; write 0.07 for 7 %"),
+            (Tension::Fast(Fast { e5: 0.02, e20: 0.01, e100: 0.03 }), "warp.fast: point 2"),
+        ] {
+            let error = tension.curve("warp").unwrap_err().to_string();
+            assert!(error.contains(message), "{error}");
+        }
+        assert!(law(100.0).curve("warp").is_ok() && kes(0.34).curve("warp").is_ok());
+        assert!(Shear::Curve(vec![[0.2, 1.0], [0.1, 2.0]]).curve().unwrap_err().to_string().starts_with("shear.curve"));
+    }
+}
