@@ -125,7 +125,7 @@ fn the_energy_is_convex_in_strains_and_shear() {
         // Pairs of states near each other and far apart.
         let one = |seed: u32| {
             let (a, other) = (state(2 * seed), state(2 * seed + 1));
-            let near = if seed % 2 == 0 { 1.0 } else { 0.05 };
+            let near = if seed.is_multiple_of(2) { 1.0 } else { 0.05 };
             let b = [0, 1, 2].map(|axis| a[axis] + near * (other[axis] - a[axis]));
             let middle = [0, 1, 2].map(|axis| 0.5 * (a[axis] + b[axis]));
             energy(middle) - 0.5 * (energy(a) + energy(b))

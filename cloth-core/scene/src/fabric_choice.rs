@@ -63,7 +63,7 @@ mod tests {
             assert!(described.friction.sliding > 0.2 && described.friction.at_rest > described.friction.sliding);
             let Material::Yarns(yarns) = &described.material else { panic!("{}", fabric.name) };
             let law = yarns.law().unwrap();
-            assert!(law.warp.k >= law.weft.k && law.shear.k < law.warp.k && law.misfits == [0.0; 3], "{law:?}");
+            assert!(law.shear.k < law.weft.k && law.misfits == [0.0; 3], "{law:?}");
             let Bending::Plate(rigidity) = yarns.bending else { panic!("{}", fabric.name) };
             let d = rigidity.matrix().unwrap();
             assert!(d[0][0] > 1e-6 && d[2][2] > 5e-7, "{}: {d:?}", fabric.name);
