@@ -77,7 +77,7 @@ mod tests {
     #[test]
     fn the_audit_covers_what_the_demonstration_is_made_of() {
         let text = audit_materials(&Simulation::new(&scene().unwrap()).unwrap()).unwrap();
-        for element in ["StVK", "BridsonBending", "Gravity", "ViscousDrag"] {
+        for element in ["YarnMembrane", "ArcAngle", "Gravity", "ViscousDrag"] {
             assert!(text.contains(element), "{text}");
         }
     }

@@ -75,4 +75,4 @@ pub use cloth_scene as scene;
 pub use simulation::{Island, Simulation, SimulationError, Summary};
 
 // Modules of this crate name those of `physics` as their own.
-use cloth_physics::{Body, barrier, collision, contact, fabric, geometry, integrator, mesh, motion, wind};
+use cloth_physics::{Body, Coulomb, barrier, collision, contact, fabric, geometry, integrator, mesh, motion, wind};

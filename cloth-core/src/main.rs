@@ -50,7 +50,7 @@ enum Command {
     Validate(cli::validate::Validate),
     /// Time the steps of a hanging sheet, 1 m × 1 m: implicit Euler by Newton's method, steps of 10 ms.
     Bench(cli::bench::Bench),
-    /// Print measured fabrics as tables for scene files, with their sources.
+    /// List the fabrics of the library, print them as tables for scene files, plot them, or read those of ARCSim.
     Fabrics(cli::fabrics::Fabrics),
     /// Print a script that completes this command in a shell.
     Completions(cli::completions::Completions),

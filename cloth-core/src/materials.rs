@@ -41,6 +41,7 @@ pub static ELEMENTS: &[AnyElement] = entries![
     ThreadLimit,
     ViscousDrag,
     WindDrag,
+    YarnMembrane,
     ZeroLengthSpring,
 ];
 

@@ -35,3 +35,4 @@ mod stress;
 mod threads;
 mod untangling;
 mod view;
+mod yarns;

@@ -14,7 +14,7 @@ integrator = "newton"
 adaptive = true
 tolerances.velocity = 1e-3
 [[garment]]
-fabric = "dots"
+fabric = "cotton-shirting"
 placement = { translate = [0.01, 0.02, 0.09] }
 mesh.disc = { radius = 0.38, rings = 10 }
 [[obstacles]]

@@ -186,3 +186,52 @@ fn a_warp_across_the_cloth_is_rejected() {
     let words = "triangle 0 stands across the warp direction [0.0, 0.0, 1.0]; choose a warp direction along the cloth";
     assert!(error.to_string().starts_with(words), "{error}");
 }
+
+/// The plate of hysteresis is elastic up to its moment, and yields there, in every direction on every mesh.
+#[test]
+fn a_plate_that_yields_stores_the_energy_of_its_moment_and_unloads_elastically() {
+    let (moment, yielding) = (2e-6, 1e-7);
+    let rigidity = Rigidity::Flexural { rigidity: moment / yielding, poisson_ratio: 0.0 };
+    for kind in MeshKind::ALL {
+        let mesh = sheet(kind, 20.0);
+        let topology = Topology::of(&mesh);
+        let curvatures = curvatures(&mesh, &topology, None).unwrap();
+        let still = vec![[0.0; 3]; mesh.vertices().len()];
+        // A cylinder about an axis at 30°, with curvatures relative to 10⁻⁶/m.
+        let (sine, cosine) = 30_f64.to_radians().sin_cos();
+        let bent = |curvature: f64| {
+            let amount = curvature / 1e-6;
+            lifted(&mesh, [amount * cosine * cosine, amount * sine * sine, 2.0 * amount * sine * cosine])
+        };
+        let term = PlateTerm::new("hysteresis", &mesh, &rigidity, [1.0, 0.0, 0.0]).unwrap();
+        let term = term.with_plastic_curvature(moment);
+        let mut system = System::new(vec![Box::new(term)], &vec![false; mesh.vertices().len()]).unwrap();
+        let mut check = |curvature: f64, elastic: f64, steps: bool| {
+            let x = bent(curvature);
+            if steps {
+                system.end_step(State { x: &x, v: &still }).unwrap();
+            }
+            let (term, _) = system.terms().next().unwrap();
+            for (triangle, energy) in term.element_energies(&x).unwrap() {
+                let one = &curvatures[triangle];
+                let exact = 0.5 * one.area * moment / yielding * elastic * elastic;
+                let unit = 0.5 * one.area * moment * yielding;
+                assert!(!one.free.is_empty() || (energy - exact).abs() < 1e-4 * unit, "{kind:?}: {energy} {exact}");
+            }
+        };
+        check(0.5 * yielding, 0.5 * yielding, true);
+        check(5.0 * yielding, yielding, true);
+        check(4.0 * yielding, 0.0, false);
+        check(2.0 * yielding, -yielding, true);
+        // A checkpoint restores it.
+        let histories = system.histories();
+        assert_eq!(histories[0].len(), 3 * mesh.triangles().len());
+        let term = PlateTerm::new("hysteresis", &mesh, &rigidity, [1.0, 0.0, 0.0]).unwrap();
+        let term = term.with_plastic_curvature(moment);
+        let mut restored = System::new(vec![Box::new(term)], &vec![false; mesh.vertices().len()]).unwrap();
+        restored.restore_histories(&histories);
+        let x = bent(3.0 * yielding);
+        let energies = [&mut system, &mut restored].map(|one| one.energies(&x).unwrap()[0].energy);
+        assert!(energies[0] == energies[1] && energies[0].is_some(), "{energies:?}");
+    }
+}

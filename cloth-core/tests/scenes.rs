@@ -2,7 +2,7 @@
 
 use cloth_core::Simulation;
 use cloth_core::materials::element;
-use cloth_core::physics::fabric::MEASURED;
+use cloth_core::physics::fabric::LIBRARY;
 use cloth_core::scene::Scene;
 
 const SOFT: &str = "[garment.fabric]\ndensity = 0.2\n[garment.fabric.material.stvk]\nstretch_stiffness = 40.0\n\
@@ -61,6 +61,52 @@ fn cloth_on_a_slope_obeys_coulomb_friction() {
         let free = slope(0.0, integrator);
         assert!((mean(&free) / (9.81 * sine * 0.5) - 1.0).abs() < 0.01, "{integrator}: {}", mean(&free));
     }
+}
+
+/// A sheet that is pushed uphill comes to rest, and static friction holds it; one that slides downhill has the kinetic
+/// friction and goes on.
+#[test]
+fn cloth_on_a_slope_is_held_by_static_friction_and_slides_with_the_kinetic_one() {
+    let mean = |velocity: f64, friction: &str| {
+        let (sine, cosine) = 0.4_f64.sin_cos();
+        let gravity = [9.81 * sine, 0.0, -9.81 * cosine];
+        let head = format!("dt = 0.005\nduration = 0.5\nintegrator = \"newton\"\ngravity = {gravity:?}");
+        let start = format!("placement.translate = [0.0, 0.0, 0.0049]\nvelocity = [{velocity:?}, 0.0, 0.0]\n");
+        let text = sheet(&head, 4, 0.2).replace("[garment.fabric]\n", &format!("{start}[garment.fabric]\n"));
+        let simulation = finished(&format!("{text}[[obstacles]]\nplane = {{}}\nfriction = {friction}\n"));
+        simulation.velocities().iter().map(|v| v[0]).sum::<f64>() / simulation.velocities().len() as f64
+    };
+    // tan 0.4 = 0.4228 lies between the two.
+    let both = "{ static = 0.6, kinetic = 0.2 }";
+    let held = mean(-0.2, both);
+    assert!(held.abs() < 2e-3, "it moves with {held} m/s");
+    let (sine, cosine) = 0.4_f64.sin_cos();
+    let expected = 0.1 + 9.81 * (sine - 0.2 * cosine) * 0.5;
+    let sliding = mean(0.1, both);
+    assert!((sliding / expected - 1.0).abs() < 0.03, "{sliding} of {expected}");
+    // With the kinetic coefficient alone, it turns round.
+    assert!(mean(-0.2, "0.2") > 0.3);
+}
+
+/// The friction of a pair replaces that of the obstacle.
+#[test]
+fn a_pair_of_parts_has_its_own_friction() {
+    let (sine, cosine) = 0.4_f64.sin_cos();
+    let gravity = [9.81 * sine, 0.0, -9.81 * cosine];
+    let head = format!("dt = 0.005\nduration = 0.5\nintegrator = \"newton\"\ngravity = {gravity:?}");
+    let lying = "placement.translate = [0.0, 0.0, 0.0049]\n[garment.fabric]\n";
+    let text = sheet(&head, 4, 0.2).replace("[garment.fabric]\n", lying);
+    let text = format!("{text}[[obstacles]]\nname = \"skin\"\nplane = {{}}\nfriction = 0.0\n");
+    let pair = "[[friction]]\nbetween = [\"skin\", \"garment 0\"]\ncoefficient = 0.6\n";
+    let fastest = |text: &str| finished(text).velocities().iter().map(|v| v[0]).fold(0.0, f64::max);
+    let (free, held) = (fastest(&text), fastest(&format!("{text}{pair}")));
+    assert!(free > 1.5 && held < 2e-3, "{free} {held}");
+    let unknown = refused(&format!("{text}{}", pair.replace("skin", "skim")));
+    assert!(unknown.contains("friction[0]: nothing is called `skim`; there are garment 0, skin"), "{unknown}");
+    let twice = refused(&format!("{text}{pair}{}", pair.replace("0.6", "0.5")));
+    assert!(twice.contains("friction[1]: friction[0] is of the same two parts"), "{twice}");
+    let other = refused(&format!("{text}{pair}").replace("newton", "implicit-euler"));
+    assert!(other.contains("`[[friction]]` needs `integrator = \"newton\"`"), "{other}");
 }
 
 #[test]
@@ -357,8 +403,8 @@ fn the_scenes_of_the_gallery_are_valid() {
 }
 
 #[test]
-fn every_measured_fabric_makes_a_simulation() {
-    for fabric in MEASURED {
+fn every_fabric_of_the_library_makes_a_simulation() {
+    for fabric in LIBRARY {
         let text =
             format!("dt = 0.01\nduration = 0.1\n[mesh.sheet]\ncells = [2, 2]\nsize = [1.0, 1.0]\n{}", fabric.table);
         let scene = Scene::parse(&text, "scene.toml".as_ref()).unwrap();

@@ -97,6 +97,7 @@ macro_rules! for_each_element {
             residual TwistMotion,
             force ViscousDrag,
             potential WindDrag,
+            potential YarnMembrane,
             potential ZeroLengthSpring,
         }
     };

@@ -76,6 +76,7 @@ elements! {
         SkeletonPoint, TukeyLoss, TwistMotion;
     viscous_drag: ViscousDrag;
     wind_drag: WindDrag;
+    yarn_membrane: YarnMembrane;
     zero_length_spring: ZeroLengthSpring;
 }
 

@@ -8,3 +8,4 @@ mod lanes;
 mod laws;
 mod operations;
 mod rigid_motions;
+mod yarns;

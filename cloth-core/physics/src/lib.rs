@@ -23,6 +23,7 @@
 #![forbid(unsafe_code)]
 
 mod body;
+mod coulomb;
 
 pub mod barrier;
 pub mod bounded;
@@ -36,3 +37,4 @@ pub mod motion;
 pub mod wind;
 
 pub use body::Body;
+pub use coulomb::Coulomb;

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use toml::{Table, Value};
 
-use cloth_physics::fabric::MEASURED;
+use cloth_physics::fabric::in_library;
 
 /// Returns the text of a scene with the material of every fabric replaced by the elements of a `.energy` file.
 /// Densities stay; bending that is part of a material goes with it. Text that is not TOML is returned unchanged:
@@ -36,8 +36,8 @@ pub fn with_untangling(scene: &str) -> String {
 /// Replaces the material of `fabric`, if the table has one.
 fn replace(holder: &mut Table, material: &Value) {
     let Some(fabric) = holder.get_mut("fabric") else { return };
-    let measured = fabric.as_str().and_then(|name| MEASURED.iter().find(|one| one.name == name));
-    if let Some(mut described) = measured.and_then(|one| one.table.parse::<Table>().ok()) {
+    let named = fabric.as_str().and_then(|name| in_library(name).ok());
+    if let Some(mut described) = named.and_then(|one| one.table.parse::<Table>().ok()) {
         *fabric = described.remove("fabric").unwrap_or(Value::Table(Table::new()));
     }
     if let Some(fabric) = fabric.as_table_mut() {
@@ -60,7 +60,7 @@ mod tests {
         let changed = with_material(text, "own.energy".as_ref(), &[("k".to_owned(), 2.5)]);
         let scene = Scene::parse(&changed, "scene.toml".as_ref()).unwrap_or_else(|error| panic!("{error}\n{changed}"));
         let densities: Vec<f64> = scene.garments.iter().map(|garment| garment.fabric.density).collect();
-        assert_eq!(densities, [0.324, 0.5]);
+        assert_eq!(densities, [0.4, 0.5]);
         for garment in &scene.garments {
             let Material::File(declared) = &garment.fabric.material else { panic!("{garment:?}") };
             assert!(declared.path.is_absolute() && declared.parameters["k"] == 2.5);

@@ -6,20 +6,20 @@ use schemars::JsonSchema;
 use serde::de::value::MapAccessDeserializer;
 use serde::de::{Deserialize, Deserializer, Error, MapAccess, Visitor};
 
-use cloth_physics::fabric::{Fabric, MEASURED};
+use cloth_physics::fabric::{Fabric, in_library};
 
 /// A fabric in a scene file, for the schema.
 #[derive(JsonSchema)]
 #[serde(untagged)]
 #[expect(dead_code, reason = "for the schema only")]
 pub(crate) enum FabricChoice {
-    /// The name of a measured fabric.
+    /// The name of a fabric of the library.
     Name(String),
     /// A fabric described in place.
     Described(Box<Fabric>),
 }
 
-/// A file that consists of a measured fabric.
+/// A table of the library.
 #[derive(serde::Deserialize)]
 struct Alone {
     fabric: Fabric,
@@ -31,24 +31,11 @@ impl<'de> Visitor<'de> for Choice {
     type Value = Fabric;
 
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str("the table of a fabric, or the name of a measured one in quotes")
+        f.write_str("the table of a fabric, or the name of one of the library in quotes")
     }
 
     fn visit_str<E: Error>(self, name: &str) -> Result<Fabric, E> {
-        const NAMES: [&str; MEASURED.len()] = {
-            let mut names = [""; MEASURED.len()];
-            let mut at = 0;
-            while at < names.len() {
-                names[at] = MEASURED[at].name;
-                at += 1;
-            }
-            names
-        };
-        let found = MEASURED.iter().find(|fabric| fabric.name == name);
-        let found = found.ok_or_else(|| {
-            let known = NAMES.map(|known| format!("`{known}`")).join(", ");
-            E::custom(format!("unknown fabric `{name}`, expected a table or one of the measured fabrics {known}"))
-        })?;
+        let found = in_library(name).map_err(E::custom)?;
         toml::from_str::<Alone>(found.table).map(|alone| alone.fabric).map_err(E::custom)
     }
 
@@ -64,45 +51,55 @@ pub(crate) fn fabric<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Fabri
 #[cfg(test)]
 mod tests {
     use crate::Scene;
-    use cloth_physics::fabric::{Bending, MEASURED, Material};
+    use cloth_physics::fabric::{Bending, LIBRARY, Material};
 
     #[test]
-    fn every_table_makes_a_scene_with_a_plate() {
-        for fabric in MEASURED {
+    fn every_table_makes_a_scene_of_yarns_with_a_plate_and_friction() {
+        for fabric in LIBRARY {
             let text =
                 format!("dt = 0.01\nduration = 0.1\n[mesh.sheet]\ncells = [2, 2]\nsize = [1.0, 1.0]\n{}", fabric.table);
             let scene = Scene::parse(&text, "scene.toml".as_ref()).unwrap();
-            let bending = match &scene.garments[0].fabric.material {
-                Material::Stvk(membrane) => {
-                    assert!(fabric.table.contains("Stretching and shear: *assumed*"), "{}", fabric.name);
-                    membrane.bending
-                }
-                Material::OrthotropicStvk(woven) => {
-                    let least = woven.warp.min(woven.weft).min(woven.bias);
-                    assert!(least > 5.0 && fabric.table.contains("Stretching and shear: of the same sample"));
-                    woven.bending
-                }
-                other => panic!("{}: {other:?}", fabric.name),
-            };
-            let Bending::Plate(rigidity) = bending else { panic!("{}", fabric.name) };
+            let described = &scene.garments[0].fabric;
+            assert!(described.friction.sliding > 0.2 && described.friction.at_rest > described.friction.sliding);
+            let Material::Yarns(yarns) = &described.material else { panic!("{}", fabric.name) };
+            let law = yarns.law().unwrap();
+            assert!(law.shear.k < law.weft.k && law.misfits == [0.0; 3], "{law:?}");
+            let Bending::Plate(rigidity) = yarns.bending else { panic!("{}", fabric.name) };
             let d = rigidity.matrix().unwrap();
-            assert!(d[0][0] > 1e-5 && d[2][2] > 1e-6, "{}: {d:?}", fabric.name);
+            assert!(d[0][0] > 1e-6 && d[2][2] > 5e-7, "{}: {d:?}", fabric.name);
         }
     }
 
     #[test]
-    fn the_strip_of_denim_is_that_of_the_table() {
-        let scene = Scene::parse(include_str!("../../../scenes/strip.toml"), "strip.toml".as_ref()).unwrap();
-        let denim = MEASURED[0].table.split("[fabric]").nth(1).unwrap();
-        let Material::Stvk(membrane) = &scene.garments[0].fabric.material else { panic!("another material") };
-        let Bending::Plate(cloth_physics::fabric::Rigidity::Orthotropic { warp, .. }) = membrane.bending else {
-            panic!("no plate")
+    fn every_number_of_the_library_has_a_source_or_is_marked_as_assumed() {
+        for fabric in LIBRARY {
+            let (head, body) = fabric.table.split_once("[fabric]").unwrap();
+            let sources: Vec<&str> =
+                head.lines().filter_map(|line| line.strip_prefix("# - ")?.split(':').next()).collect();
+            for line in body.lines().filter(|line| line.contains('=')) {
+                let comment = line.split_once('#').map_or("", |(_, comment)| comment);
+                assert!(sources.iter().any(|source| comment.contains(source)), "{}: {line}", fabric.name);
+            }
+            for source in &sources {
+                assert!(body.contains(source), "{}: {source} is not used", fabric.name);
+            }
+        }
+    }
+
+    #[test]
+    fn a_name_of_an_earlier_version_gives_the_most_similar_fabric() {
+        let scene = |name: &str| {
+            let text = format!(
+                "dt = 0.01\nduration = 0.1\n[[garment]]\nfabric = \"{name}\"\nmesh.disc = {{ radius = 1.0, rings = 2 }}\n"
+            );
+            Scene::parse(&text, "scene.toml".as_ref()).unwrap_err().to_string()
         };
-        assert!(
-            denim.contains("density = 0.324")
-                && scene.garments[0].fabric.density == 0.324
-                && (warp - 64.196_457e-6).abs() < 1e-15
-        );
-        assert!(scene.adaptive);
+        let old = ["interlock", "ribbon", "dots", "ponte", "rib", "sweat", "swim", "jacket", "target"];
+        for name in old {
+            let error = scene(name);
+            let named = LIBRARY.iter().filter(|fabric| error.contains(&format!("is `{}`", fabric.name))).count();
+            assert_eq!(named, 1, "{error}");
+        }
+        assert!(scene("leather").contains("`cotton-shirting`, `denim`"), "{}", scene("leather"));
     }
 }

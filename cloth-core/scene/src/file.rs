@@ -2,7 +2,7 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::garment::{Garment, Mesh, Placement};
-use super::{ContactChoice, Exclusion, Hair, ObstacleDescription, OutputChoice, Pin, Scene, Seam, Sleep};
+use super::{ContactChoice, Exclusion, Hair, ObstacleDescription, OutputChoice, PairFriction, Pin, Scene, Seam, Sleep};
 use cloth_physics::bounded::{Count, MaybeReal, NonNegative, Number, Positive, Real, Reals};
 use cloth_physics::fabric::Fabric;
 use cloth_physics::integrator::{LinearSolverChoice, Scheme, Tolerances};
@@ -24,6 +24,7 @@ const VERSION: usize = 1;
 #[schemars(extend("if" = { "anyOf": [
     { "properties": { "contact": { "const": "on" } }, "required": ["contact"] },
     { "properties": { "exclude": { "minItems": 1 } }, "required": ["exclude"] },
+    { "properties": { "friction": { "minItems": 1 } }, "required": ["friction"] },
 ] }))]
 #[schemars(extend("then" = { "properties": { "integrator": { "const": "newton" } }, "required": ["integrator"] }))]
 pub(super) struct File {
@@ -34,7 +35,7 @@ pub(super) struct File {
     /// The mesh of a single garment, with `fabric`. For several garments use `[[garment]]`.
     #[serde(default)]
     mesh: Option<Mesh>,
-    /// The fabric of the single garment: a table, or the name of a measured fabric.
+    /// The fabric of the single garment: a table, or the name of a fabric of the library.
     #[serde(default, deserialize_with = "some_fabric")]
     #[schemars(with = "Option<crate::fabric_choice::FabricChoice>")]
     fabric: Option<Fabric>,
@@ -76,6 +77,10 @@ pub(super) struct File {
     /// Parts that do not collide with each other. Needs the integrator `newton`. Default none.
     #[serde(default)]
     exclude: Vec<Exclusion>,
+    /// Friction of pairs of parts, in place of that of their fabrics or obstacles. Needs the integrator `newton`. Default
+    /// none.
+    #[serde(default)]
+    friction: Vec<PairFriction>,
     /// Repair shallow crossings at the start: move vertices until nothing crosses, by at most three times the thickness
     /// and gap of contact. Needs certified contact. Default false.
     #[serde(default)]
@@ -153,6 +158,9 @@ impl TryFrom<File> for Scene {
         if !file.exclude.is_empty() && file.integrator != Scheme::Newton {
             return Err("`exclude` needs `integrator = \"newton\"`, whose contact is between features".to_owned());
         }
+        if !file.friction.is_empty() && file.integrator != Scheme::Newton {
+            return Err("`[[friction]]` needs `integrator = \"newton\"`, whose contact is between features".to_owned());
+        }
         if file.untangle && (file.integrator != Scheme::Newton || file.contact == Some(ContactChoice::Off)) {
             return Err("`untangle` needs `integrator = \"newton\"` with contact, which is certified".to_owned());
         }
@@ -195,6 +203,7 @@ impl TryFrom<File> for Scene {
             tolerances: file.tolerances,
             contact: file.contact.unwrap_or(usual),
             exclusions: file.exclude,
+            pair_friction: file.friction,
             untangle: file.untangle,
             linear_solver: file.linear_solver,
             adaptive: file.adaptive,

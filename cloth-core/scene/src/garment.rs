@@ -18,7 +18,7 @@ pub struct Garment {
     pub name: Option<String>,
     /// Shape: the table `sheet`, `disc`, `strip` or `obj`.
     pub mesh: Mesh,
-    /// Fabric: a table, or the name of a measured fabric (see `cloth fabrics`).
+    /// Fabric: a table, or the name of a fabric of the library (see `cloth fabrics`).
     #[serde(deserialize_with = "crate::fabric_choice::fabric")]
     #[schemars(with = "crate::fabric_choice::FabricChoice")]
     pub fabric: Fabric,

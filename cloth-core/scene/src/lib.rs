@@ -11,6 +11,7 @@
 
 #![forbid(unsafe_code)]
 
+pub mod arcsim;
 mod changed_text;
 mod contact_choice;
 mod error;
@@ -22,6 +23,7 @@ mod inputs;
 mod numbered_files;
 mod obstacle;
 mod output;
+mod pair_friction;
 mod pins;
 mod rest_shape;
 mod scene;
@@ -41,6 +43,7 @@ pub use garment::{Garment, Inflation, Mesh, Placement, Turn};
 pub use numbered_files::NumberingError;
 pub use obstacle::{ObstacleDescription, ObstacleError};
 pub use output::{CameraChoice, OutputChoice};
+pub use pair_friction::PairFriction;
 pub use pins::{Pin, PinBox, PinChoice, SoftPin};
 pub use rest_shape::{RestFile, RestScale, RestShape, RestTexture};
 pub use scene::Scene;

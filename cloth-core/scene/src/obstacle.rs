@@ -5,6 +5,7 @@ use serde::Deserialize;
 
 use super::garment::{Placement, Turn};
 use super::numbered_files::{NumberingError, check_numbers, numbered_files};
+use cloth_physics::Coulomb;
 use cloth_physics::bounded::{Direction, MaybeReal, NonNegative, Number, Positive, Real, Reals};
 use cloth_physics::contact::{
     AnySolid, Ball, Capsule, Deformation, HalfSpace, MeshSolid, Obstacle, RoundedBox, Surface, SurfaceError,
@@ -46,9 +47,10 @@ struct Keys {
     mesh: Option<MeshKeys>,
     /// Name in the ledger and in messages. Default the shape's name and the obstacle's index from 0.
     name: Option<String>,
-    /// Coefficient of friction. Default 0.
-    #[serde(default, with = "Real::<NonNegative>")]
-    friction: f64,
+    /// Friction: a coefficient, or the table `static`, `kinetic`. Dry skin has about 0.3, damp skin 0.9. Integrators
+    /// other than `newton` use the kinetic coefficient only. Default 0.
+    #[serde(default)]
+    friction: Coulomb,
     /// Sliding velocity at which friction reaches 1/√2 of its full size, in m/s. Slower cloth sticks, but creeps. No
     /// meaning with `newton`, whose friction does not creep. Default 0.001.
     #[serde(default = "sticking", with = "Real::<Positive>")]
@@ -68,7 +70,7 @@ struct Keys {
 #[derive(Clone, Debug, PartialEq)]
 struct Common {
     name: Option<String>,
-    friction: f64,
+    friction: Coulomb,
     sticking: f64,
     thickness: f64,
     stiffness: f64,

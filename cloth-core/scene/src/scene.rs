@@ -7,7 +7,8 @@ use cloth_physics::wind::Wind;
 use serde::Deserialize;
 
 use super::{
-    ContactChoice, Exclusion, Garment, Hair, ObstacleDescription, OutputChoice, Pin, SceneError, Seam, Sleep, TimeGrid,
+    ContactChoice, Exclusion, Garment, Hair, ObstacleDescription, OutputChoice, PairFriction, Pin, SceneError, Seam,
+    Sleep, TimeGrid,
 };
 
 /// The largest size of a scene file, in bytes. Parsing takes up to 80 times as much memory.
@@ -43,6 +44,8 @@ pub struct Scene {
     pub untangle: bool,
     /// Parts that do not collide with each other.
     pub exclusions: Vec<Exclusion>,
+    /// Friction of pairs of parts.
+    pub pair_friction: Vec<PairFriction>,
     /// The linear solver of implicit integrators.
     pub linear_solver: LinearSolverChoice,
     /// Whether a failed step is retried with smaller sizes; see [`Adaptive`].

@@ -5,21 +5,25 @@ use std::ops::Range;
 
 use energy_dsl::Vector3;
 use energy_elements::ZeroLengthSpring;
-use energy_solve::{DissipationTerm, DrivenTerm, ElementList, ListError, PotentialTerm, Term};
+use energy_solve::{DissipationTerm, DrivenTerm, ElementList, ListError, PotentialTerm, Term, index};
 
 use super::closing_seam::ClosingSeam;
 use super::exclusions::{self, ExclusionError, Referents};
 use super::inflation::{self, PressureLaw};
-use super::parts::{IslandModel, Model, ModelError, MovingPin, Part, PartKind, PinnedVertices, TermLabel, UnknownPart};
+use super::parts::{
+    IslandModel, Model, ModelError, MovingPin, PairFrictionError, Part, PartKind, PinnedVertices, TermLabel,
+    UnknownPart,
+};
 use super::seam::Side;
 use super::soft_pin::{Held, SoftPinTerm};
 use super::{PinError, SeamError, pins, seam};
+use crate::Coulomb;
 use crate::contact::AnySolid;
 use crate::fabric::{self, Hair, StitchDamping, Surroundings, SystemPart};
 use crate::geometry::{Pose, add_scaled, norm, subtract};
 use crate::mesh::{CornerAttributes, DisjointSets, SpringNetwork, Topology, TriangleMesh};
 use crate::motion::Motion;
-use crate::scene::{ContactChoice, Garment, Pin, Scene, Seam, Shape, SoftPin};
+use crate::scene::{ContactChoice, Garment, PairFriction, Pin, Scene, Seam, Shape, SoftPin};
 
 /// A model under construction.
 pub(super) struct Builder<'a> {
@@ -90,6 +94,7 @@ impl<'a> Builder<'a> {
         self.add_obstacles()?;
         self.pin()?;
         self.exclude()?;
+        self.model.pair_friction = self.pair_friction()?;
         Ok(self.model)
     }
 
@@ -143,7 +148,7 @@ impl<'a> Builder<'a> {
         let count = vertices.len();
         self.model.v.extend(vec![[0.0; 3]; count]);
         self.model.thickness.extend(vec![hair.thickness(); count]);
-        self.model.friction.extend(vec![0.0; count]);
+        self.model.friction.extend(vec![Coulomb::default(); count]);
         self.model.x.extend(vertices);
         let segment = hair.length / hair.segments as f64;
         self.add_part(part, count, PartKind::Hair { joints: hair.segments + 1, segment, width: hair.thickness() });
@@ -363,6 +368,27 @@ impl<'a> Builder<'a> {
         self.model.exclusions = exclusions;
         self.model.warnings.extend(idle);
         Ok(())
+    }
+
+    /// Returns the numbers and the friction of the chosen pairs of parts.
+    fn pair_friction(&self) -> Result<Vec<([u32; 2], Coulomb)>, PairFrictionError> {
+        let parts = self.model.parts.iter().map(|part| &part.name);
+        let names: Vec<&String> = parts.chain(self.model.obstacles.iter().map(|obstacle| &obstacle.name)).collect();
+        let mut chosen: Vec<([u32; 2], Coulomb)> = Vec::new();
+        for (pair, PairFriction { between, coefficient }) in self.scene.pair_friction.iter().enumerate() {
+            let number = |name: &String| {
+                let unknown = || names.iter().map(|name| (*name).clone()).collect();
+                let found = names.iter().position(|known| *known == name).map(index);
+                found.ok_or_else(|| PairFrictionError::Name { pair, name: name.clone(), known: unknown() })
+            };
+            let (one, other) = (number(&between[0])?, number(&between[1])?);
+            let numbers = [one.min(other), one.max(other)];
+            if let Some(before) = chosen.iter().position(|(known, _)| *known == numbers) {
+                return Err(PairFrictionError::Twice { pair, before });
+            }
+            chosen.push((numbers, *coefficient));
+        }
+        Ok(chosen)
     }
 
     fn add_obstacles(&mut self) -> Result<(), ModelError> {

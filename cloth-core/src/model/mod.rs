@@ -13,6 +13,9 @@ mod soft_pin;
 pub use anchor::Anchor;
 pub use exclusions::ExclusionError;
 pub use inflation::NotClosed;
-pub use parts::{IslandModel, Model, ModelError, MovingPin, Part, PartKind, PinnedVertices, TermLabel, UnknownPart};
+pub use parts::{
+    IslandModel, Model, ModelError, MovingPin, PairFrictionError, Part, PartKind, PinnedVertices, TermLabel,
+    UnknownPart,
+};
 pub use pins::PinError;
 pub use seam::SeamError;

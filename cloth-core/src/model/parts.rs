@@ -9,6 +9,7 @@ use energy_solve::{ListError, Term};
 use super::builder::Builder;
 use super::inflation::NotClosed;
 use super::{ExclusionError, PinError, SeamError};
+use crate::Coulomb;
 use crate::collision::Exclusions;
 use crate::contact::Obstacle;
 use crate::fabric::FabricError;
@@ -136,8 +137,10 @@ pub struct Model {
     pub sewn: Vec<[usize; 2]>,
     /// Thickness in contact at each vertex, in m.
     pub thickness: Vec<f64>,
-    /// Coefficient of friction with cloth at each vertex.
-    pub friction: Vec<f64>,
+    /// Friction with cloth at each vertex.
+    pub friction: Vec<Coulomb>,
+    /// Friction of pairs of parts: their numbers, obstacles after cloth and hair, and the coefficients.
+    pub pair_friction: Vec<([u32; 2], Coulomb)>,
     /// Descriptions of the garments from files: their pieces and welded vertices.
     pub notes: Vec<String>,
     /// Warnings about the scene.
@@ -157,6 +160,29 @@ pub struct UnknownPart {
     pub name: String,
     /// The existing names.
     pub known: Vec<String>,
+}
+
+/// Friction of a pair with a part that does not exist, or twice of the same pair.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[expect(missing_docs, reason = "the messages name the fields")]
+#[non_exhaustive]
+pub enum PairFrictionError {
+    /// A name that no part has.
+    #[error("friction[{pair}]: nothing is called `{name}`; there are {}", .known.join(", "))]
+    Name {
+        /// Index of the pair, from 0.
+        pair: usize,
+        name: String,
+        /// The existing names.
+        known: Vec<String>,
+    },
+    /// A pair that another table has.
+    #[error("friction[{pair}]: friction[{before}] is of the same two parts; leave one out")]
+    Twice {
+        /// Indices of the pairs, from 0.
+        pair: usize,
+        before: usize,
+    },
 }
 
 /// A scene whose parts do not fit together.
@@ -186,6 +212,9 @@ pub enum ModelError {
     /// A seam is invalid.
     #[error(transparent)]
     Seam(#[from] SeamError),
+    /// The friction of a pair is invalid.
+    #[error(transparent)]
+    PairFriction(#[from] PairFrictionError),
     /// An exclusion is invalid.
     #[error(transparent)]
     Exclusion(#[from] ExclusionError),

@@ -1,8 +1,10 @@
 //! Contact of a scene with itself and with obstacles.
 
+use energy_solve::index;
+
 use crate::barrier::{
-    BarrierContact, ContactError, Feature, FirstPush, GAP_PER_THICKNESS, LARGEST_REACH, ObstacleStart, Participants,
-    Untangling, local_thinning,
+    BarrierContact, ContactError, Feature, FirstPush, GAP_PER_THICKNESS, LARGEST_REACH, ObstacleStart, PairFriction,
+    Participants, Untangling, local_thinning,
 };
 use crate::collision::CollisionMesh;
 use crate::contact::{AnySolid, Obstacle};
@@ -41,8 +43,16 @@ pub(super) fn add_contact(
     push.into_iter().for_each(|push| note(model, note_on_push(&push)));
     let contact = contact.with_friction(vertices.iter().map(|&vertex| model.friction[vertex]).collect());
     let contact = contact.with_obstacle_friction(island.prescribed().friction(&model.obstacles, vertices.len()));
+    let contact = contact.with_pair_friction(pair_friction(vertices, model));
     island.body_mut().system.set_contact(Box::new(contact));
     Ok(())
+}
+
+/// Returns the friction of the chosen pairs of parts, for the vertices of an island.
+fn pair_friction(vertices: &[usize], model: &Model) -> PairFriction {
+    let part = |&vertex: &usize| model.parts.iter().position(|part| part.vertices.contains(&vertex));
+    let part_of = vertices.iter().map(|vertex| index(part(vertex).unwrap_or(model.parts.len()))).collect();
+    PairFriction::new(part_of, index(model.parts.len()), &model.pair_friction)
 }
 
 /// Returns what collides in an island.

@@ -53,7 +53,7 @@ impl Prescribed {
         let mut friction = |(part, obstacle): (&Part, &Obstacle)| {
             let frame = (!part.frame().is_empty()).then(|| energy_solve::index(next));
             next += part.frame().len();
-            ObstacleFriction { coefficient: obstacle.friction, frame, deforms: part.deformation.is_some() }
+            ObstacleFriction { coefficients: obstacle.friction, frame, deforms: part.deformation.is_some() }
         };
         self.obstacles.iter().zip(obstacles).map(&mut friction).collect()
     }
@@ -104,13 +104,23 @@ impl Part {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Coulomb;
     use crate::contact::Ball;
     use crate::motion::Key;
 
     fn obstacle(solid: AnySolid, motion: Option<Motion>) -> Obstacle {
         let name = "it".to_owned();
         let deformation = None;
-        Obstacle { name, solid, motion, deformation, thickness: 5e-3, stiffness: 1.0, friction: 0.3, sticking: 1e-3 }
+        Obstacle {
+            name,
+            solid,
+            motion,
+            deformation,
+            thickness: 5e-3,
+            stiffness: 1.0,
+            friction: Coulomb::uniform(0.3),
+            sticking: 1e-3,
+        }
     }
 
     #[test]

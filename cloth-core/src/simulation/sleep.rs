@@ -148,6 +148,7 @@ impl<'a> StepContext<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Coulomb;
     use crate::contact::Ball;
     use crate::motion::Key;
 
@@ -187,7 +188,7 @@ mod tests {
             motion: Some(Motion { keys, ..Motion::default() }),
             thickness: 0.1,
             stiffness: 1.0,
-            friction: 0.0,
+            friction: Coulomb::default(),
             sticking: 1e-3,
         };
         let obstacles = [obstacle];

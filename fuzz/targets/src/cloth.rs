@@ -7,6 +7,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use cloth_core::Simulation;
 use cloth_core::output::OutputFolder;
 use cloth_core::run::{Checkpoint, MemoryNeed, Record, Run, RunOptions, write_report};
+use cloth_core::scene::arcsim::Fabric;
 use cloth_core::scene::{Scene, with_material};
 use cloth_core::sweep::Grid;
 use energy_files::sealed::Seal;
@@ -26,6 +27,10 @@ pub(crate) const SCENE: Target = Target {
 /// A `.energy` file that a scene names.
 pub(crate) const MATERIAL: Target =
     Target { name: "material", words: language::WORDS, shared: &["scenes/own.energy"], made: Vec::new, read: material };
+
+/// A fabric file of ARCSim, converted to a table.
+pub(crate) const ARCSIM: Target =
+    Target { name: "arcsim", words: crate::fusion::WORDS, shared: &[], made: Vec::new, read: arcsim };
 
 /// A table of values of `cloth sweep`.
 pub(crate) const SWEEP: Target = Target { name: "sweep", words: WORDS, shared: &[], made: Vec::new, read: sweep };
@@ -69,6 +74,13 @@ gltf = false
 /// Relative paths of scenes lead to this folder, which nothing is written to.
 fn scene_path() -> PathBuf {
     repository().join("scenes/fuzzed.toml")
+}
+
+/// Converts a fabric; the result must be a table of a scene, unless its numbers contradict each other.
+fn arcsim(input: &[u8], _: &Path) -> Result<(), String> {
+    let table = Fabric::parse(text(input)?).map_err(message)?.table("fuzzed");
+    let scene = format!("dt = 0.01\nduration = 0.1\n[mesh.disc]\nradius = 1.0\nrings = 2\n{table}");
+    Scene::parse(&scene, &scene_path()).map(|_| ()).map_err(message)
 }
 
 /// Parses a scene. `None` if it is too large to be stepped.

@@ -14,7 +14,8 @@ mod target;
 pub use target::{PATIENCE, Target};
 
 /// All targets, sorted by name.
-pub const TARGETS: [Target; 19] = [
+pub const TARGETS: [Target; 20] = [
+    cloth::ARCSIM,
     fusion::BODY,
     fusion::BVH,
     fusion::CAMERA,

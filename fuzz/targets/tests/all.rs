@@ -90,6 +90,6 @@ macro_rules! tests {
 }
 
 tests! {
-    body bvh camera checkpoint declarations depth_image formula glb gltf image_list joints material obj rig run_folder
-    scene skeleton sweep track
+    arcsim body bvh camera checkpoint declarations depth_image formula glb gltf image_list joints material obj rig
+    run_folder scene skeleton sweep track
 }

@@ -13,6 +13,9 @@ pub(super) const LENGTH: f64 = 1e-4;
 /// The cosine between the normals of two pairs with one feature in common, above which they are the same contact.
 const SAME_CONTACT: f64 = 0.5;
 
+/// How much shorter than its full length a deflection may be in a pair that slips: the normal turns from step to step.
+const SLIPPING: f64 = 1e-3;
+
 /// The kind of pairs of edges in names.
 const EDGES: u32 = 1;
 
@@ -97,6 +100,11 @@ impl Bristles {
         vectors.truncate(count);
         Self::in_order((names, vectors))
     }
+}
+
+/// Whether a bristle is bent to its full length: its pair slipped in the last step.
+pub(super) fn slips(deflection: Vector3<f64>) -> bool {
+    norm(deflection) >= LENGTH * (1.0 - SLIPPING)
 }
 
 /// Limits a displacement to the length of a bristle.

@@ -5,6 +5,9 @@
 //! and the bristle follows. A bristle at rest stays at rest, so a pair that sticks does not creep. With ε a tenth of
 //! the length of a bristle, a pair that slips has 0.995 of the friction μ λ.
 //!
+//! A pair whose bristle is bent to its full length at the start of a step slips: it has the kinetic coefficient μ in
+//! that step. All others have the static one.
+//!
 //! Closest points, normal and normal force λ are lagged: taken at the start of the step, so that friction has a
 //! potential (Li et al. 2020, "Incremental potential contact", §5.5).
 //!
@@ -16,8 +19,10 @@ use energy_solve::threads::for_each;
 use energy_solve::{Contact, ContactMemory, SlidingStiffness};
 
 use super::PART;
-use super::bristle::{Bristles, LENGTH};
+use super::bristle::{Bristles, LENGTH, slips};
 use super::law::Law;
+use super::pair_friction::PairFriction;
+use crate::Coulomb;
 use crate::collision::{Closest, CollisionMesh, Pair};
 use crate::geometry::{add_scaled, dot, norm, subtract};
 
@@ -31,8 +36,10 @@ const ONE_DISPLACEMENT: &str = "each pair has one displacement";
 /// The friction of a step.
 #[derive(Debug, Default)]
 pub(super) struct Friction {
-    /// μ at each vertex of cloth and hair; empty without friction between them.
-    pub coefficients: Vec<f64>,
+    /// The friction at each vertex of cloth and hair; empty without friction between them.
+    pub coefficients: Vec<Coulomb>,
+    /// The friction of chosen pairs of parts.
+    pub chosen: PairFriction,
     /// The friction of each obstacle.
     pub obstacles: Vec<ObstacleFriction>,
     /// Positions at the start of the step.
@@ -46,8 +53,8 @@ pub(super) struct Friction {
 /// The friction of an obstacle.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ObstacleFriction {
-    /// The coefficient of friction.
-    pub coefficient: f64,
+    /// The coefficients of friction.
+    pub coefficients: Coulomb,
     /// The first of four vertices that move with the obstacle: an origin, and the ends of three orthogonal unit
     /// vectors from there. `None` if the obstacle is fixed or deforms.
     pub frame: Option<u32>,
@@ -123,30 +130,37 @@ impl Friction {
 
     /// Whether anything has friction.
     pub fn has_friction(&self) -> bool {
-        !self.coefficients.is_empty() || self.obstacles.iter().any(|obstacle| obstacle.coefficient > 0.0)
+        !self.coefficients.is_empty()
+            || self.chosen.has_friction()
+            || self.obstacles.iter().any(|obstacle| !obstacle.coefficients.is_zero())
     }
 
-    /// The coefficient of friction of a pair.
-    fn coefficient(&self, mesh: &CollisionMesh, pair: &Pair) -> f64 {
-        if let Some(obstacle) = mesh.obstacle_of(pair) {
-            return self.obstacles[obstacle].coefficient;
+    /// The coefficients of friction of a pair.
+    fn coefficients(&self, mesh: &CollisionMesh, pair: &Pair) -> Coulomb {
+        if let Some(chosen) = self.chosen.of(mesh, pair) {
+            return chosen;
         }
-        let of = |vertex: u32| self.coefficients.get(vertex as usize).copied().unwrap_or(0.0);
-        0.5 * (of(pair.vertices[0]) + of(pair.vertices[pair.first()]))
+        if let Some(obstacle) = mesh.obstacle_of(pair) {
+            return self.obstacles[obstacle].coefficients;
+        }
+        let of = |vertex: u32| self.coefficients.get(vertex as usize).copied().unwrap_or_default();
+        of(pair.vertices[0]).between(of(pair.vertices[pair.first()]))
     }
 
     /// Lags friction: takes the pairs in contact at the start, in order, with their laws and closest points.
     pub fn lag(&mut self, mesh: &CollisionMesh, in_contact: &[(Pair, Law, Closest)], threads: usize) {
         let of = |(pair, law, closest): &(Pair, Law, Closest)| {
-            let limit = self.coefficient(mesh, pair) * law.force(law.apart(closest));
-            if limit <= 0.0 {
+            let (coefficients, force) = (self.coefficients(mesh, pair), law.force(law.apart(closest)));
+            if coefficients.is_zero() || force <= 0.0 {
                 return None;
             }
             let (weights, anchor) = self.lagged_point(mesh, pair, closest);
             let normal = closest.normal;
             let between = displacement(pair, &weights, anchor, &self.start);
             let is_on_obstacle = mesh.obstacle_of(pair).is_some();
-            let straight = subtract(between, self.bristles.deflection(pair, normal, is_on_obstacle));
+            let deflection = self.bristles.deflection(pair, normal, is_on_obstacle);
+            let straight = subtract(between, deflection);
+            let limit = force * if slips(deflection) { coefficients.sliding } else { coefficients.at_rest };
             let element = SlidingFriction::new(normal, straight, limit, SOFTNESS);
             Some((LaggedPair { pair: *pair, weights, anchor, normal, straight }, element))
         };
@@ -401,7 +415,7 @@ mod tests {
     fn on_obstacle(cloth_is_first: bool) -> (LaggedPair, [Vector3<f64>; 2]) {
         let core = Core { vertices: POSITIONS[3..6].to_vec(), triangles: vec![[0, 1, 2]], ..Core::default() };
         let mesh = CollisionMesh::new(3, &[[0, 1, 2]], &[], &[]).with_obstacles(&[core]);
-        let obstacles = vec![ObstacleFriction { coefficient: 0.5, frame: Some(6), deforms: false }];
+        let obstacles = vec![ObstacleFriction { coefficients: Coulomb::uniform(0.5), frame: Some(6), deforms: false }];
         let friction = Friction { obstacles, start: POSITIONS.to_vec(), ..Friction::default() };
         let pair = pair(if cloth_is_first { [0, 3, 4, 5] } else { [4, 0, 1, 2] });
         let closest = Closest::of(&pair, &pair.corners(&POSITIONS));

@@ -29,6 +29,7 @@ mod bristle;
 mod feasible;
 mod friction;
 mod law;
+mod pair_friction;
 mod pressed;
 mod resistance;
 mod rolling;
@@ -44,9 +45,11 @@ use energy_solve::{ContactCounts, ContactForces, ContactMemory, ContactModel, Co
 
 pub use friction::ObstacleFriction;
 pub use law::{CURVATURE_AT_HALF, STIFFNESS_RATIO};
+pub use pair_friction::PairFriction;
 pub use start::{ContactError, Feature, FirstPush, ObstacleStart, Participants};
 pub use untangle::Untangling;
 
+use crate::Coulomb;
 use crate::collision::{Closest, CollisionMesh, Move, Neighbourhood, Pair, Search};
 use active_set::{ActivePart, ActiveSet};
 use friction::Friction;
@@ -92,11 +95,18 @@ impl BarrierContact {
         self.spacings.of(&self.mesh, pair)
     }
 
-    /// Sets the coefficient of friction μ at each vertex. That of a pair is the mean of its two features.
+    /// Sets the coefficients of friction at each vertex. Those of a pair are the means of its two features.
     #[must_use]
-    pub fn with_friction(mut self, coefficients: Vec<f64>) -> Self {
-        let has_friction = coefficients.iter().any(|coefficient| *coefficient > 0.0);
+    pub fn with_friction(mut self, coefficients: Vec<Coulomb>) -> Self {
+        let has_friction = coefficients.iter().any(|coefficients| !coefficients.is_zero());
         self.friction.coefficients = if has_friction { coefficients } else { Vec::new() };
+        self
+    }
+
+    /// Sets the friction of chosen pairs of parts, in place of that of their vertices or obstacles.
+    #[must_use]
+    pub fn with_pair_friction(mut self, chosen: PairFriction) -> Self {
+        self.friction.chosen = chosen;
         self
     }
 

@@ -5,6 +5,7 @@ use proptest::prelude::*;
 
 use super::law::Law;
 use super::*;
+use crate::Coulomb;
 use crate::collision::PairKind;
 use crate::geometry::{add_scaled, cross, dot, norm, subtract};
 
@@ -88,7 +89,7 @@ fn friction_opposes_sliding() {
     const FRICTION: f64 = 0.4;
     for x in states() {
         let force_at = |coefficient: f64, to: &[Vector3<f64>]| {
-            let mut contact = contact(&x).with_friction(vec![coefficient; 6]);
+            let mut contact = contact(&x).with_friction(vec![Coulomb::uniform(coefficient); 6]);
             contact.begin_step(&x).lag_friction(&resistance(6));
             update(&mut contact, &x);
             let mut force = vec![[0.0; 3]; 6];
@@ -420,7 +421,10 @@ fn threads_change_no_bit_of_many_pairs() {
     let run = |threads: usize| {
         let mesh = CollisionMesh::new(VERTICES, &triangles, &[], &[]);
         let (free, radii) = (vec![true; VERTICES], vec![0.5 * THICKNESS; VERTICES]);
-        let mut contact = BarrierContact::new(mesh, &x, free, radii, GAP).unwrap().with_friction(vec![0.3; VERTICES]);
+        let mut contact =
+            BarrierContact::new(mesh, &x, free, radii, GAP)
+                .unwrap()
+                .with_friction(vec![Coulomb::uniform(0.3); VERTICES]);
         contact.set_threads(threads);
         contact.begin_step(&x);
         let dofs = DofMap::new(&[false; VERTICES]);

@@ -11,9 +11,10 @@ mod strict;
 mod whole;
 
 pub use range::{
-    AboveOne, Angle, Channel, Fraction, NonNegative, Number, PoissonRatio, Positive, SPEED_OF_LIGHT, Signed, Speed,
+    AboveOne, Angle, Channel, Fraction, NonNegative, Number, PoissonRatio, Positive, Range, SPEED_OF_LIGHT, Share,
+    Signed, Speed, Strain,
 };
-pub use real::{Colours, Direction, MaybeReal, MaybeRealList, MaybeReals, Real, RealMap, Reals};
+pub use real::{Colours, Direction, MaybeReal, MaybeRealList, MaybeReals, Points, Real, RealMap, Reals};
 pub use strict::Strict;
 pub use whole::{Count, Counts, MaybeCount, MaybePair, MaybeVertices, Pair, Pairs};
 

@@ -93,6 +93,11 @@ ranges! {
         "a number strictly between −1 and 1", "numbers strictly between −1 and 1"; "";
     /// Relative tolerances.
     Fraction: (0.0, false), (1.0, false); "a number strictly between 0 and 1", "numbers strictly between 0 and 1"; "";
+    /// Strains of curves.
+    Strain: (0.0, false), (2.0, true); "a strain greater than 0", "strains greater than 0";
+        "strains are no percentages, 7 % is 0.07";
+    /// Parts of a whole.
+    Share: (0.0, false), (1.0, true); "a number greater than 0", "numbers greater than 0"; "it is part of a whole";
     /// Channels of a colour.
     Channel: (0.0, true), (1.0, true); "a number from 0 to 1", "numbers from 0 to 1"; "";
     /// Angles of a camera.

@@ -7,7 +7,7 @@ use serde::de::{Deserialize, Deserializer, Error, Visitor};
 
 use super::described::{array, described};
 use super::exactly;
-use super::range::{Channel, Number, Range};
+use super::range::{Channel, Number, Positive, Range};
 
 /// A real number of any size.
 struct AnyReal(f64);
@@ -59,6 +59,9 @@ pub struct MaybeReals<R, const N: usize>(PhantomData<R>);
 /// A list of numbers of the range R, or none.
 pub struct MaybeRealList<R>(PhantomData<R>);
 
+/// Points of a curve, with coordinates above 0.
+pub struct Points;
+
 /// A list of RGB colours.
 pub struct Colours;
 
@@ -92,16 +95,28 @@ impl<R: Range> MaybeRealList<R> {
     }
 }
 
+/// Reads a list of arrays of N numbers of the range R.
+fn list_of<'de, R: Range, const N: usize, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<[f64; N]>, D::Error> {
+    struct One<R, const N: usize>([f64; N], PhantomData<R>);
+    impl<'de, R: Range, const N: usize> Deserialize<'de> for One<R, N> {
+        fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+            reals::<R, N, D>(deserializer).map(|numbers| One(numbers, PhantomData))
+        }
+    }
+    Ok(Vec::<One<R, N>>::deserialize(deserializer)?.into_iter().map(|One(numbers, _)| numbers).collect())
+}
+
 impl Colours {
     /// Reads the value. Returns an error if it is of another kind or out of range.
     pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<[f64; 3]>, D::Error> {
-        struct One([f64; 3]);
-        impl<'de> Deserialize<'de> for One {
-            fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-                reals::<Channel, 3, D>(deserializer).map(One)
-            }
-        }
-        Ok(Vec::<One>::deserialize(deserializer)?.into_iter().map(|One(colour)| colour).collect())
+        list_of::<Channel, 3, D>(deserializer)
+    }
+}
+
+impl Points {
+    /// Reads the value. Returns an error if it is of another kind or out of range.
+    pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<[f64; 2]>, D::Error> {
+        list_of::<Positive, 2, D>(deserializer)
     }
 }
 
@@ -154,6 +169,9 @@ described!([R: Range, const N: usize] MaybeReals<R, N>, Option<[f64; 3]>, array(
 described!([R: Range] MaybeRealList<R>, Option<Vec<f64>>, json_schema!({ "type": "array", "items": R::schema() }));
 described!([] Colours, Vec<[f64; 3]>, json_schema!({
     "type": "array", "items": array(&Channel::schema(), 3)
+}));
+described!([] Points, Vec<[f64; 2]>, json_schema!({
+    "type": "array", "items": array(&Positive::schema(), 2)
 }));
 described!([R: Range] RealMap<R>, BTreeMap<String, f64>, json_schema!({
     "type": "object", "additionalProperties": R::schema()

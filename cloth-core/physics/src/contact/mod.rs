@@ -28,6 +28,7 @@ pub use surface::{Feature, Nearest, Surface, SurfaceError};
 
 use crate::body::Body;
 
+use crate::Coulomb;
 use crate::geometry::{Pose, dot};
 use crate::motion::Motion;
 use friction::FrictionLaw;
@@ -111,8 +112,8 @@ pub struct Obstacle {
     pub thickness: f64,
     /// Contact stiffness k over the mass of the vertex, in 1/s². Unused in certified contact.
     pub stiffness: f64,
-    /// Coefficient of friction.
-    pub friction: f64,
+    /// Coefficients of friction. Only certified contact knows pairs at rest; other integrators use the kinetic one.
+    pub friction: Coulomb,
     /// The sliding velocity at which friction reaches 1/√2 of its full size, in m/s. Unused in certified contact.
     pub sticking: f64,
 }
@@ -191,8 +192,8 @@ impl Obstacle {
         let name = format!("{}{part}", self.name);
         let contact = ContactTerm::new(name.clone(), solid.clone(), motion.clone(), thickness, stiffness.clone(), 0.0);
         let mut terms: Vec<Box<dyn Term>> = vec![Box::new(contact)];
-        if self.friction > 0.0 {
-            let (coefficient, sticking) = (self.friction, self.sticking);
+        if self.friction.sliding > 0.0 {
+            let (coefficient, sticking) = (self.friction.sliding, self.sticking);
             let law = FrictionLaw { solid, motion, thickness, stiffness, coefficient, sticking };
             let each: Vec<[usize; 1]> = (0..masses.len()).map(|vertex| [vertex]).collect();
             terms.push(Box::new(DissipationTerm::new(format!("{name}: friction"), law, &each)));

@@ -111,13 +111,23 @@ fn passes(solid: &AnySolid, start: Vector3<f64>, end: Vector3<f64>, thickness: f
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Coulomb;
     use crate::contact::{Ball, HalfSpace};
     use crate::motion::{Key, Motion};
 
     fn obstacle(solid: AnySolid, motion: Option<Motion>) -> Obstacle {
         let name = "ball".to_owned();
         let deformation = None;
-        Obstacle { name, solid, motion, deformation, thickness: 0.01, stiffness: 1.0, friction: 0.0, sticking: 1e-3 }
+        Obstacle {
+            name,
+            solid,
+            motion,
+            deformation,
+            thickness: 0.01,
+            stiffness: 1.0,
+            friction: Coulomb::default(),
+            sticking: 1e-3,
+        }
     }
 
     fn passed(obstacle: &Obstacle, from: Vector3<f64>, to: Vector3<f64>) -> Option<Passage> {

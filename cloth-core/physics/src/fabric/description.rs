@@ -4,6 +4,8 @@ use serde::Deserialize;
 use super::Declared;
 use super::plate::Rigidity;
 use super::warp_choice::WarpChoice;
+use super::yarns::Yarns;
+use crate::Coulomb;
 use crate::bounded::{AboveOne, MaybeReal, NonNegative, PoissonRatio, Positive, Real, Reals};
 use crate::mesh::Warp;
 
@@ -17,11 +19,13 @@ pub struct Fabric {
     /// Thickness in contact with cloth, in m. Default `density` over 470 kg/m³, the bulk density of plain cotton.
     #[serde(default, with = "MaybeReal::<Positive>")]
     pub thickness: Option<f64>,
-    /// Coefficient of friction with cloth; between two fabrics, the mean of theirs. Default 0.
-    #[serde(default, with = "Real::<NonNegative>")]
-    pub friction: f64,
+    /// Friction with cloth: a coefficient, or the table `static`, `kinetic`; between two fabrics, the means of theirs.
+    /// Default 0.
+    #[serde(default)]
+    pub friction: Coulomb,
     /// Resistance to stretching and bending: the table `mass-spring`, `stvk`, `neo-hookean`, `stable-neo-hookean`,
-    /// `stable-neo-hookean-log`, `arap`, `baraff-witkin`, `orthotropic-stvk`, or `file` for elements of your own.
+    /// `stable-neo-hookean-log`, `arap`, `baraff-witkin`, `orthotropic-stvk`, `yarns`, or `file` for elements of your
+    /// own.
     pub material: Material,
     /// Direction of the warp in the rest shape, projected onto each triangle; or `uv`, the direction in which the first
     /// texture coordinate of the OBJ file grows. Default [1, 0, 0].
@@ -40,6 +44,9 @@ pub struct Fabric {
     /// Limits beyond which the cloth stays deformed. Default none.
     #[serde(default)]
     pub plasticity: Option<Plasticity>,
+    /// Friction between yarns that bend. Default none.
+    #[serde(default)]
+    pub hysteresis: Option<Hysteresis>,
 }
 
 impl Fabric {
@@ -49,13 +56,14 @@ impl Fabric {
         Self {
             density,
             thickness: None,
-            friction: 0.0,
+            friction: Coulomb::default(),
             material,
             warp: first_axis(),
             strain: Strain::default(),
             strain_limit: None,
             rayleigh: None,
             plasticity: None,
+            hysteresis: None,
         }
     }
 
@@ -123,6 +131,23 @@ pub struct Plasticity {
     pub curvature: Option<f64>,
 }
 
+/// Friction between yarns that bend: a second plate, in parallel to the bending resistance, that is elastic up to a
+/// moment and yields there. So the curve of moment over curvature is a loop of this half width.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Hysteresis {
+    /// The largest moment per width, in N: half of what KES-F bending testers print as 2HB (1 gf·cm/cm is 9.807 mN).
+    #[serde(with = "Real::<Positive>")]
+    pub moment: f64,
+    /// The change of curvature after which the moment is reached, in 1/m. Default 20.
+    #[serde(default = "yield_curvature", with = "Real::<Positive>")]
+    pub curvature: f64,
+}
+
+fn yield_curvature() -> f64 {
+    20.0
+}
+
 /// Resistance to stretching and bending.
 #[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
@@ -144,8 +169,28 @@ pub enum Material {
     BaraffWitkin(BaraffWitkin),
     /// Woven St. Venant–Kirchhoff triangles, from tensile tests of strips along warp, weft and bias.
     OrthotropicStvk(Woven),
+    /// Two families of yarns that stiffen when stretched, from the numbers of KES or FAST testers or from curves.
+    Yarns(Yarns),
     /// Elements declared in your own `.energy` file.
     File(Declared),
+}
+
+impl Material {
+    /// Returns the bending resistance; `None` for springs.
+    pub(super) fn bending(&self) -> Option<&Bending> {
+        match self {
+            Self::MassSpring(_) => None,
+            Self::Stvk(material)
+            | Self::NeoHookean(material)
+            | Self::StableNeoHookean(material)
+            | Self::StableNeoHookeanLog(material) => Some(&material.bending),
+            Self::Arap(material) => Some(&material.bending),
+            Self::BaraffWitkin(material) => Some(&material.bending),
+            Self::OrthotropicStvk(material) => Some(&material.bending),
+            Self::Yarns(material) => Some(&material.bending),
+            Self::File(declared) => Some(&declared.bending),
+        }
+    }
 }
 
 /// ARAP (as-rigid-as-possible) triangles.

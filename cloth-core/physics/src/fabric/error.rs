@@ -3,6 +3,7 @@ use energy_solve::ListError;
 
 use super::declared::DeclaredError;
 use super::plate::{PlateError, RigidityError, ThreadError};
+use super::yarns::YarnError;
 
 /// A fabric that does not fit a mesh.
 #[derive(Debug, thiserror::Error)]
@@ -21,6 +22,9 @@ pub enum FabricError {
     /// The stiffnesses of woven cloth contradict each other.
     #[error("material.orthotropic-stvk: {0}")]
     Woven(#[from] RigidityError),
+    /// The numbers of a tester contradict each other.
+    #[error("material.yarns.{0}")]
+    Yarns(#[from] YarnError),
     /// A triangle has no warp direction.
     #[error(transparent)]
     Threads(#[from] ThreadError),

@@ -12,16 +12,18 @@ mod plasticity;
 pub mod plate;
 mod terms;
 mod warp_choice;
+mod yarns;
 
 pub use damping::StitchDamping;
 pub use declared::{Declared, DeclaredError};
 pub use description::{
-    Arap, BaraffWitkin, Bending, Fabric, MassSpring, Material, Membrane, Plasticity, Rayleigh, Strain, StrainLimit,
-    Woven,
+    Arap, BaraffWitkin, Bending, Fabric, Hysteresis, MassSpring, Material, Membrane, Plasticity, Rayleigh, Strain,
+    StrainLimit, Woven,
 };
 pub use error::FabricError;
 pub use hair::{Hair, hair_terms};
-pub use library::{MEASURED, MeasuredFabric};
+pub use library::{LIBRARY, LibraryFabric, UnknownFabric, in_library};
 pub use plate::{PlateTerm, Rigidity};
 pub use terms::{FabricTerms, Surroundings, SystemPart, terms, terms_at};
 pub use warp_choice::MaybeWarpChoice;
+pub use yarns::{Compression, Fast, Kes, Shear, StiffeningCurve, Tension, TensionLaw, YarnError, YarnLaw, Yarns};

@@ -13,7 +13,7 @@ use super::locking::Folds;
 use super::nodal::{self, NodalMembrane, RestShapes};
 use super::plasticity::{PlasticHinges, PlasticMembrane, angle_of_curvature};
 use super::plate::{PlateTerm, Rigidity, ThreadError};
-use super::{Bending, Fabric, MassSpring, Material, Plasticity, Rayleigh, Strain, StrainLimit};
+use super::{Bending, Fabric, Hysteresis, MassSpring, Material, Plasticity, Rayleigh, Strain, StrainLimit};
 use crate::geometry::{cross, norm, subtract};
 use crate::mesh::{
     Hinge, MaterialTriangle, SpringNetwork, Topology, TriangleMesh, Warp, lumped_masses, material_triangle, rest_angle,
@@ -83,27 +83,23 @@ pub fn terms_at(
     let cloth = MaterialMesh { mesh, triangles, is_woven, warp: fabric.warp, plasticity, folds };
     check_plasticity(fabric)?;
     // λ and μ for small strains; damping is proportional to them.
-    let (stiffness, bending) = match &fabric.material {
+    let stiffness = match &fabric.material {
         Material::MassSpring(material) => {
             terms.add_springs(material, mesh, springs)?;
-            ((0.0, 0.0), None)
+            (0.0, 0.0)
         }
-        Material::Stvk(material) => (terms.add_isotropic(&cloth, material.lame(), StVK::new)?, Some(&material.bending)),
-        Material::NeoHookean(material) => {
-            (terms.add_isotropic(&cloth, material.lame(), NeoHookean::new)?, Some(&material.bending))
-        }
-        Material::StableNeoHookean(material) => {
-            (terms.add_isotropic(&cloth, material.lame(), stable_neo_hookean)?, Some(&material.bending))
-        }
+        Material::Stvk(material) => terms.add_isotropic(&cloth, material.lame(), StVK::new)?,
+        Material::NeoHookean(material) => terms.add_isotropic(&cloth, material.lame(), NeoHookean::new)?,
+        Material::StableNeoHookean(material) => terms.add_isotropic(&cloth, material.lame(), stable_neo_hookean)?,
         Material::StableNeoHookeanLog(material) => {
-            (terms.add_isotropic(&cloth, material.lame(), stable_neo_hookean_log)?, Some(&material.bending))
+            terms.add_isotropic(&cloth, material.lame(), stable_neo_hookean_log)?
         }
         Material::Arap(material) => {
             let mu = material.stretch_stiffness;
             terms.add_membrane("membrane", mu == 0.0, &cloth, move |[u0, u1, u2]| {
                 AsRigidAsPossible::new(u0, u1, u2, mu)
             })?;
-            ((0.0, 0.5 * mu), Some(&material.bending))
+            (0.0, 0.5 * mu)
         }
         Material::BaraffWitkin(material) => {
             let ([b_u, b_v], stretch, shear) = (material.rest_stretch, material.stretch, material.shear);
@@ -113,7 +109,7 @@ pub fn terms_at(
             terms.add_membrane("shear", shear == 0.0, &cloth, move |[u0, u1, u2]| {
                 BaraffWitkinShear::new(u0, u1, u2, shear / area([u0, u1, u2]))
             })?;
-            ((0.0, 0.5 * stretch), Some(&material.bending))
+            (0.0, 0.5 * stretch)
         }
         Material::OrthotropicStvk(material) => {
             let strips = Rigidity::Orthotropic {
@@ -126,18 +122,28 @@ pub fn terms_at(
             terms.add_membrane("membrane", false, &cloth, move |[u0, u1, u2]| {
                 OrthotropicStVK::new(u0, u1, u2, c_uu - c_uv, c_vv - c_uv, c_uv, c_ss)
             })?;
-            ((c_uv, c_ss), Some(&material.bending))
+            (c_uv, c_ss)
+        }
+        Material::Yarns(material) => {
+            let law = material.law()?;
+            terms.warnings.extend(law.warnings(&terms.part.prefix));
+            terms.add_membrane("membrane", false, &cloth, move |triangle| law.element(triangle))?;
+            (law.coupling, law.shear.k)
         }
         Material::File(declared) => {
             terms.add_declared(declared, &cloth, fabric.density)?;
-            ((0.0, 0.0), Some(&declared.bending))
+            (0.0, 0.0)
         }
     };
+    let bending = fabric.material.bending();
     if let Some(limit) = &fabric.strain_limit {
         terms.add_strain_limit(limit, &cloth)?;
     }
     if let Some(bending) = bending {
         terms.add_bending(bending, &cloth)?;
+    }
+    if let Some(hysteresis) = &fabric.hysteresis {
+        terms.add_hysteresis(hysteresis, &cloth)?;
     }
     if let Some(rayleigh) = &fabric.rayleigh {
         terms.add_rayleigh(rayleigh, stiffness, bending.unwrap_or(&Bending::None), &cloth)?;
@@ -160,41 +166,38 @@ struct MaterialMesh<'a> {
 
 /// Returns the folds that the membrane must not lock; `None` for plain triangles.
 fn folds(fabric: &Fabric, surroundings: &Surroundings) -> Result<Option<Folds>, FabricError> {
-    let bending = match &fabric.material {
-        _ if fabric.strain == Strain::PerTriangle => return Ok(None),
-        Material::MassSpring(_) | Material::File(_) => return Ok(None),
-        Material::Stvk(material) | Material::NeoHookean(material) => &material.bending,
-        Material::StableNeoHookean(material) | Material::StableNeoHookeanLog(material) => &material.bending,
-        Material::Arap(material) => &material.bending,
-        Material::BaraffWitkin(material) => &material.bending,
-        Material::OrthotropicStvk(material) => &material.bending,
+    if fabric.strain == Strain::PerTriangle || matches!(fabric.material, Material::MassSpring(_) | Material::File(_)) {
+        return Ok(None);
+    }
+    let rigidity = match fabric.material.bending() {
+        Some(Bending::Plate(plate)) => {
+            let [[along_warp, ..], [_, along_weft, _], _] = plate.matrix()?;
+            along_warp.min(along_weft)
+        }
+        bending => rigidity_along_grid(bending.unwrap_or(&Bending::None))?,
     };
     // Folds without gravity are judged as if there were some.
     let gravity = Some(norm(surroundings.gravity)).filter(|&gravity| gravity > 0.0).unwrap_or(9.81);
-    Ok(Some(Folds { rigidity: rigidity_along_grid(bending)?, weight: gravity * fabric.density }))
+    Ok(Some(Folds { rigidity, weight: gravity * fabric.density }))
 }
 
 /// Returns an error if something would have to yield that cannot.
 fn check_plasticity(fabric: &Fabric) -> Result<(), FabricError> {
     let Some(Plasticity { stretch, curvature }) = fabric.plasticity else { return Ok(()) };
-    let bending = match &fabric.material {
-        Material::MassSpring(_) | Material::File(_) if stretch.is_some() => return Err(FabricError::CannotStretch),
-        Material::MassSpring(_) => None,
-        Material::Stvk(material) | Material::NeoHookean(material) => Some(&material.bending),
-        Material::StableNeoHookean(material) | Material::StableNeoHookeanLog(material) => Some(&material.bending),
-        Material::Arap(material) => Some(&material.bending),
-        Material::BaraffWitkin(material) => Some(&material.bending),
-        Material::OrthotropicStvk(material) => Some(&material.bending),
-        Material::File(material) => Some(&material.bending),
-    };
-    let can_fold = matches!(bending, Some(Bending::Plate(_) | Bending::Bridson { .. }));
+    if stretch.is_some() && matches!(fabric.material, Material::MassSpring(_) | Material::File(_)) {
+        return Err(FabricError::CannotStretch);
+    }
+    let can_fold = matches!(fabric.material.bending(), Some(Bending::Plate(_) | Bending::Bridson { .. }));
     if curvature.is_some() && !can_fold { Err(FabricError::CannotFold) } else { Ok(()) }
 }
 
 /// Maps every triangle to its plane; with the first axis along the warp if the fabric depends on it. Returns whether it
 /// does.
 fn material_triangles(mesh: &TriangleMesh, fabric: &Fabric) -> Result<(Vec<MaterialTriangle>, bool), ThreadError> {
-    let woven = matches!(fabric.material, Material::BaraffWitkin(_) | Material::OrthotropicStvk(_) | Material::File(_));
+    let woven = matches!(
+        fabric.material,
+        Material::BaraffWitkin(_) | Material::OrthotropicStvk(_) | Material::Yarns(_) | Material::File(_)
+    );
     let all = 0..mesh.triangles().len();
     if !woven && fabric.strain_limit.is_none() {
         return Ok((all.map(|triangle| material_triangle(mesh.corners(triangle))).collect(), false));
@@ -460,6 +463,17 @@ impl FabricTerms {
                 self.add_force("bending", &stencils, hinges.iter().map(element).collect())
             }
         }
+    }
+
+    fn add_hysteresis(&mut self, hysteresis: &Hysteresis, cloth: &MaterialMesh<'_>) -> Result<(), FabricError> {
+        let Hysteresis { moment, curvature } = *hysteresis;
+        let rigidity = Rigidity::Flexural { rigidity: moment / curvature, poisson_ratio: 0.0 };
+        let plate = PlateTerm::new(self.named("bending hysteresis"), cloth.mesh, &rigidity, cloth.warp)?;
+        if !self.leave_out("bending hysteresis", false, plate.triangles()) {
+            let plate = plate.with_plastic_curvature(moment);
+            self.terms.push(Box::new(plate.on_vertices_from(self.part.first)));
+        }
+        Ok(())
     }
 
     pub(super) fn add_surroundings(&mut self, surroundings: &Surroundings) -> Result<(), FabricError> {

@@ -31,6 +31,8 @@ pub struct PlateTerm {
     rest: Vec<f64>,
     /// The largest |θ − θ̄| of each hinge; `None` if hinges do not yield.
     limits: Option<Vec<f64>>,
+    /// The moment at which triangles yield, in N; `None` if they do not.
+    largest_moment: Option<f64>,
     pub(super) patches: Vec<Patch>,
     /// Vertices of the patches, padded to the same number by repeating the first.
     stencils: Vec<u32>,
@@ -56,6 +58,12 @@ pub(super) struct Patch {
     vertices: Vec<usize>,
     /// Its hinges: their indices, their b, and the positions of their points in `vertices`.
     angles: Vec<Angle>,
+    /// Rest area, in m².
+    area: f64,
+    /// √(A D₁₁).
+    scale: f64,
+    /// The part of Σ b (θ − θ̄) that is plastic.
+    plastic: [f64; 3],
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -125,6 +133,7 @@ impl PlateTerm {
             hinges,
             rest,
             limits: None,
+            largest_moment: None,
             patches,
             stencils,
             arity,
@@ -143,6 +152,14 @@ impl PlateTerm {
     pub fn yielding(self, mesh: &TriangleMesh, curvature: f64) -> Self {
         let limit = |hinge| angle_of_curvature(mesh, hinge, curvature);
         Self { limits: Some(Topology::of(mesh).hinges.iter().map(limit).collect()), ..self }
+    }
+
+    /// Lets triangles yield: at the end of each step, the plastic curvature of each follows until the moment tensor of
+    /// an isotropic plate has at most this Frobenius norm, in N (radial return). For a cylinder that is its moment per
+    /// width. Other plates yield at ½ ‖r‖² = ½ A M²/D₁₁.
+    #[must_use]
+    pub fn with_plastic_curvature(self, moment: f64) -> Self {
+        Self { largest_moment: Some(moment), ..self }
     }
 
     /// Shifts the vertex indices by `first`, for a mesh that is one of several in a system.
@@ -312,17 +329,28 @@ impl Patch {
                 u8::try_from(vertices.partition_point(|&known| known < vertex)).expect("a patch has few vertices")
             });
         }
-        (!angles.is_empty()).then_some(Self { vertices, angles })
+        let (area, scale) = (curvature.area, curvature.area.sqrt() * factor[0][0]);
+        (!angles.is_empty()).then_some(Self { vertices, angles, area, scale, plastic: [0.0; 3] })
+    }
+
+    /// Moves the plastic part until the moment is at most the given one, in N.
+    fn flow(&mut self, values: &[f64], moment: f64) {
+        let r = self.residual(values);
+        // ‖r‖ = √(A/D) M of an isotropic plate; `scale` is √(A D).
+        let (size, limit) = (dot(r, r).sqrt(), moment * self.area / self.scale);
+        if size > limit {
+            (0..3).for_each(|k| self.plastic[k] += (1.0 - limit / size) * r[k]);
+        }
     }
 
     /// Returns the same patch, whose hinges have new indices.
     fn renumbered(&self, new_index: &[usize]) -> Self {
         let angles = self.angles.iter().map(|angle| Angle { hinge: new_index[angle.hinge], ..*angle }).collect();
-        Self { vertices: self.vertices.clone(), angles }
+        Self { vertices: self.vertices.clone(), angles, ..*self }
     }
 
     fn residual(&self, values: &[f64]) -> [f64; 3] {
-        let mut r = [0.0; 3];
+        let mut r = self.plastic.map(|part| -part);
         for angle in &self.angles {
             for k in 0..3 {
                 r[k] += angle.b[k] * values[angle.hinge];
@@ -429,6 +457,7 @@ impl PlacedTerm for PlateTerm {
             hinges: hinges.iter().map(|&hinge| self.hinges[hinge]).collect(),
             rest: hinges.iter().map(|&hinge| self.rest[hinge]).collect(),
             limits: None,
+            largest_moment: None,
             patches: patches.iter().map(|patch| patch.renumbered(&new_index)).collect(),
             stencils: numbers.iter().flat_map(stencil).collect(),
             arity: self.arity,
@@ -458,19 +487,31 @@ impl PlacedTerm for PlateTerm {
                 flow(&mut self.rest[hinge..=hinge], &strains[hinge..=hinge], &limits[hinge..=hinge]);
             }
         }
+        if let Some(moment) = self.largest_moment {
+            let angles = self.values(end.x).angles;
+            self.active.iter().for_each(|&patch| self.patches[patch].flow(&angles, moment));
+        }
     }
 
     fn is_driven(&self) -> bool {
-        self.limits.is_some()
+        self.limits.is_some() || self.largest_moment.is_some()
     }
 
     fn history(&self) -> Vec<f64> {
-        if self.limits.is_some() { self.rest.clone() } else { Vec::new() }
+        let rest = self.limits.as_ref().map_or(&[][..], |_| &self.rest);
+        let patches = if self.largest_moment.is_some() { &self.patches[..] } else { &[] };
+        rest.iter().copied().chain(patches.iter().flat_map(|patch| patch.plastic)).collect()
     }
 
     fn restore_history(&mut self, history: &[f64]) {
-        if history.len() == self.rest.len() {
-            self.rest.copy_from_slice(history);
+        let rest = if self.limits.is_some() { self.rest.len() } else { 0 };
+        let patches = if self.largest_moment.is_some() { self.patches.len() } else { 0 };
+        if history.len() != rest + 3 * patches {
+            return;
+        }
+        self.rest[..rest].copy_from_slice(&history[..rest]);
+        for (patch, saved) in self.patches.iter_mut().zip(history[rest..].chunks_exact(3)) {
+            patch.plastic.copy_from_slice(saved);
         }
     }
 
