@@ -8,6 +8,7 @@ mod hair;
 mod library;
 mod locking;
 mod nodal;
+mod patch_blocks;
 mod plasticity;
 pub mod plate;
 mod terms;

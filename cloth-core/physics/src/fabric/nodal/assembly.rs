@@ -1,130 +1,76 @@
-//! Sums of the derivatives of patches.
+//! Sums of the derivatives of patches. The kernels are compiled for each SIMD level.
 
-use energy_dsl::{Block, Kernel, Level, Vector3, dispatch, triangle_index};
-use energy_solve::{Curvature, Precision, Restriction, change_dense};
+use energy_dsl::{Block, Kernel, Level, Vector3};
+use energy_solve::{Curvature, Precision, State, change_dense};
 
 use super::law::{Response, Strain};
-use super::patch::Patch;
+use super::symmetric::with_eigenvalues;
 use super::term::NodalMembrane;
+use crate::fabric::patch_blocks::{Factors, GROUP, Row};
 use crate::geometry::dot;
 
-/// Slots of the blocks of a patch: of the pairs i ≤ j, and of the transposed pairs if the matrix stores both triangles.
-#[derive(Clone, Debug)]
-pub(super) struct PatchSlots {
-    pub slots: Vec<u32>,
-    pub mirrored: Vec<u32>,
-}
-
-impl PatchSlots {
-    /// Returns the slots in a restricted matrix.
-    pub fn restricted(&self, restriction: &Restriction<'_>) -> Self {
-        let slots = |slots: &[u32]| slots.iter().map(|&slot| restriction.slot(slot)).collect();
-        Self { slots: slots(&self.slots), mirrored: slots(&self.mirrored) }
-    }
-}
-
-/// Patches with their responses at positions x.
-#[derive(Clone, Copy)]
-pub(super) struct Assembly<'a> {
+/// Returns the mean strains of the active patches.
+pub(super) struct Strains<'a> {
     pub of: &'a NodalMembrane,
-    pub responses: &'a [Response],
     pub x: &'a [Vector3<f64>],
 }
 
-/// ∂Ē/∂x of one vertex: a vector per component of the strain.
-type Row = [Vector3<f64>; 3];
+impl Kernel for Strains<'_> {
+    type Output = Vec<Strain>;
 
-impl<'a> Assembly<'a> {
-    fn patches(&self) -> impl Iterator<Item = (&'a Patch, &'a Response)> + use<'a> {
-        let of = self.of;
-        of.active.iter().map(move |&patch| &of.patches[patch]).zip(self.responses)
-    }
-
-    /// Subtracts Σ S : ∂Ē/∂x.
-    pub fn subtract_gradient(&self, force: &mut [Vector3<f64>]) {
-        let mut differences = Vec::new();
-        for (patch, response) in self.patches() {
-            patch.differences(self.x, &mut differences);
-            subtract_product_of_form(patch, response.stress, &differences, force);
+    #[inline(always)]
+    fn run<L: Level>(self) -> Vec<Strain> {
+        let mut strains = vec![[0.0; 3]; self.of.active.len()];
+        for (strain, &patch) in strains.iter_mut().zip(&self.of.active) {
+            *strain = self.of.patches[patch].strain(self.x);
         }
-    }
-
-    /// Subtracts the product of the exact Hessian with v.
-    pub fn subtract_product(&self, velocity: &[Vector3<f64>], product: &mut [Vector3<f64>]) {
-        let (mut differences, mut rows, mut velocities) = (Vec::new(), Vec::new(), Vec::new());
-        for (patch, response) in self.patches() {
-            patch.differences(self.x, &mut differences);
-            gradients(patch, &differences, &mut rows);
-            velocities.clear();
-            velocities.extend(patch.vertices.iter().map(|&vertex| velocity[vertex]));
-            let rate = |k: usize| rows.iter().zip(&velocities).map(|(row, v)| dot(row[k], *v)).sum::<f64>();
-            let rates = [0, 1, 2].map(rate);
-            let stress_rate = response.moduli.map(|row| dot(row, rates));
-            for (row, &vertex) in rows.iter().zip(&patch.vertices) {
-                for (gradient, rate) in row.iter().zip(stress_rate) {
-                    (0..3).for_each(|axis| product[vertex][axis] -= rate * gradient[axis]);
-                }
-            }
-            subtract_product_of_form(patch, response.stress, &velocities, product);
-        }
-    }
-
-    /// Adds `scale` times the Hessian, Σ ∂Ē/∂xᵀ (∂S/∂E) ∂Ē/∂x + S : ∂²Ē/∂x².
-    pub fn add_hessian<T: Precision>(self, scale: f64, curvature: Curvature, matrix: &mut [Block<T>]) {
-        dispatch(Hessians { assembly: self, scale, curvature, matrix });
+        strains
     }
 }
 
-/// Subtracts Σ_j (S : form_ij) v_j of each vertex i of a patch.
-fn subtract_product_of_form(patch: &Patch, stress: Strain, vectors: &[Vector3<f64>], sum: &mut [Vector3<f64>]) {
-    let mut pair = 0;
-    for (i, &row) in patch.vertices.iter().enumerate() {
-        for (j, &column) in patch.vertices.iter().enumerate().skip(i) {
-            let weight = weighted(&stress, &patch.forms[pair]);
-            (0..3).for_each(|axis| sum[row][axis] -= weight * vectors[j][axis]);
-            if i != j {
-                (0..3).for_each(|axis| sum[column][axis] -= weight * vectors[i][axis]);
-            }
-            pair += 1;
+/// Subtracts Σ S : ∂Ē/∂x.
+pub(super) struct Forces<'a> {
+    pub of: &'a NodalMembrane,
+    pub responses: &'a [Response],
+    pub x: &'a [Vector3<f64>],
+    pub force: &'a mut [Vector3<f64>],
+}
+
+impl Kernel for Forces<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<L: Level>(self) {
+        let Self { of, responses, x, force } = self;
+        let mut rows = Vec::new();
+        for (&patch, response) in of.active.iter().zip(responses) {
+            let patch = &of.patches[patch];
+            rows.clear();
+            patch.append_gradients(x, &mut rows);
+            subtract_gradient(&rows, &patch.vertices, &response.stress, force);
         }
     }
 }
 
-/// Writes ∂Ē/∂x of the vertices of a patch.
 #[inline(always)]
-fn gradients(patch: &Patch, differences: &[Vector3<f64>], rows: &mut Vec<Row>) {
-    rows.clear();
-    rows.resize(differences.len(), [[0.0; 3]; 3]);
-    let mut pair = 0;
-    for i in 0..differences.len() {
-        let at = differences[i];
-        let mut row = rows[i];
-        for j in i..differences.len() {
-            let form = &patch.forms[pair];
-            for k in 0..3 {
-                for axis in 0..3 {
-                    row[k][axis] += form[k] * differences[j][axis];
-                }
-            }
-            if i != j {
-                let other = &mut rows[j];
-                for k in 0..3 {
-                    for axis in 0..3 {
-                        other[k][axis] += form[k] * at[axis];
-                    }
-                }
-            }
-            pair += 1;
+fn subtract_gradient(rows: &[Row<f64>], vertices: &[usize], stress: &Strain, force: &mut [Vector3<f64>]) {
+    for (row, &vertex) in rows.iter().zip(vertices) {
+        let force = &mut force[vertex];
+        for axis in 0..3 {
+            force[axis] -= stress[0] * row[0][axis] + stress[1] * row[1][axis] + stress[2] * row[2][axis];
         }
-        rows[i] = row;
     }
 }
 
-struct Hessians<'a, T> {
-    assembly: Assembly<'a>,
-    scale: f64,
-    curvature: Curvature,
-    matrix: &'a mut [Block<T>],
+/// Subtracts Σ S : ∂Ē/∂x, and adds `scale` times the Hessian, Σ ∂Ē/∂xᵀ (∂S/∂E) ∂Ē/∂x + S : ∂²Ē/∂x².
+pub(super) struct Hessians<'a, T> {
+    pub of: &'a NodalMembrane,
+    pub responses: &'a [Response],
+    pub x: &'a [Vector3<f64>],
+    pub scale: f64,
+    pub curvature: Curvature,
+    pub force: &'a mut [Vector3<f64>],
+    pub matrix: &'a mut [Block<T>],
 }
 
 impl<T: Precision> Kernel for Hessians<'_, T> {
@@ -132,135 +78,98 @@ impl<T: Precision> Kernel for Hessians<'_, T> {
 
     #[inline(always)]
     fn run<L: Level>(self) {
-        let Self { assembly, scale, curvature, matrix } = self;
-        let (mut differences, mut rows, mut products) = (Vec::new(), Vec::new(), Vec::<Row>::new());
-        let mut isotropic = Vec::new();
-        let all = assembly.of.active.iter().zip(assembly.responses).zip(&assembly.of.slots);
-        for ((&patch, response), slots) in all {
-            let patch = &assembly.of.patches[patch];
-            let moduli = changed_moduli(response, curvature);
-            isotropic_part(patch, response.stress, curvature, &mut isotropic);
-            patch.differences(assembly.x, &mut differences);
-            gradients(patch, &differences, &mut rows);
-            products.clear();
-            for row in &rows {
-                let mut product = [[0.0; 3]; 3];
-                for k in 0..3 {
-                    let [a, b, c] = moduli[k].map(|entry| scale * entry);
-                    for axis in 0..3 {
-                        product[k][axis] = a * row[0][axis] + b * row[1][axis] + c * row[2][axis];
-                    }
+        let Self { of, responses, x, scale, curvature, force, matrix } = self;
+        let (mut rows, mut factors) = (Vec::<Row<f64>>::new(), Vec::<[Factors<T>; 3]>::new());
+        let mut multiples = Vec::<T>::new();
+        let groups = of.active.chunks(GROUP).zip(responses.chunks(GROUP)).zip(of.slots.chunks(GROUP));
+        for ((patches, responses), slots) in groups {
+            rows.clear();
+            multiples.clear();
+            patches.iter().for_each(|&patch| of.patches[patch].append_gradients(x, &mut rows));
+            factors.resize(rows.len(), [Factors::zeros(); 3]);
+            let mut first = 0;
+            for (&patch, response) in patches.iter().zip(responses) {
+                let patch = &of.patches[patch];
+                let own = first..first + patch.vertices.len();
+                first = own.end;
+                subtract_gradient(&rows[own.clone()], &patch.vertices, &response.stress, force);
+                let (moduli, stress) = match curvature {
+                    Curvature::Exact => (response.moduli, response.stress),
+                    _ => changed(response, curvature),
+                };
+                patch.append_stress_stiffness(&stress.map(|component| scale * component), &mut multiples);
+                for (factors, row) in factors[own.clone()].iter_mut().zip(&rows[own]) {
+                    // `black_box` keeps LLVM from vectorising this loop with scatters.
+                    write_factors(std::hint::black_box(factors), row, &moduli, scale);
                 }
-                products.push(product);
             }
-            let mut pair = 0;
-            for (i, row) in rows.iter().enumerate() {
-                for (j, product) in products.iter().enumerate().skip(i) {
-                    let block = block_of(row, product, scale * isotropic[pair]);
-                    add(&mut matrix[slots.slots[pair] as usize], &block, false);
-                    if i != j
-                        && let Some(&slot) = slots.mirrored.get(pair)
-                    {
-                        add(&mut matrix[slot as usize], &block, true);
-                    }
-                    pair += 1;
-                }
+            let (mut left, mut multiples) = (&factors[..], &multiples[..]);
+            for slots in slots {
+                let (own, others) = left.split_at(slots.vertices);
+                let (of_pairs, of_others) = multiples.split_at(slots.vertices * (slots.vertices + 1) / 2);
+                slots.add(own, Some(of_pairs), matrix);
+                (left, multiples) = (others, of_others);
             }
         }
     }
 }
 
-/// Returns Σ sₖ fₖ.
+/// Writes the factors of `scale` ∂Ē/∂x and (∂S/∂E) ∂Ē/∂x of a vertex.
 #[inline(always)]
-fn weighted(stress: &Strain, form: &Strain) -> f64 {
-    let mut sum = 0.0;
+fn write_factors<T: Precision>(factors: &mut [Factors<T>; 3], row: &Row<f64>, moduli: &[[f64; 3]; 3], scale: f64) {
     for k in 0..3 {
-        sum += stress[k] * form[k];
-    }
-    sum
-}
-
-/// Returns Σ rₖ pₖᵀ + k 1.
-#[inline(always)]
-fn block_of(row: &Row, product: &Row, isotropic: f64) -> Block<f64> {
-    let mut block = [[0.0; 3]; 3];
-    for i in 0..3 {
-        for j in 0..3 {
-            for k in 0..3 {
-                block[i][j] += row[k][i] * product[k][j];
-            }
+        let (mut left, mut right) = ([T::from_f64(0.0); 4], [T::from_f64(0.0); 4]);
+        for axis in 0..4 {
+            left[axis] = T::from_f64(scale * row[k][axis]);
+            let [a, b, c] = [row[0][axis], row[1][axis], row[2][axis]];
+            right[axis] = T::from_f64(moduli[k][0] * a + moduli[k][1] * b + moduli[k][2] * c);
         }
-        block[i][i] += isotropic;
-    }
-    block
-}
-
-#[inline(always)]
-fn add<T: Precision>(sum: &mut Block<T>, block: &Block<f64>, transposed: bool) {
-    for i in 0..3 {
-        for j in 0..3 {
-            let entry = if transposed { block[j][i] } else { block[i][j] };
-            sum[i][j] = sum[i][j] + T::from_f64(entry);
-        }
+        factors[k] = Factors::new(&left, &right);
     }
 }
 
-/// Returns the moduli, with eigenvalues treated as `curvature` says.
-fn changed_moduli(response: &Response, curvature: Curvature) -> [[f64; 3]; 3] {
+/// Returns moduli and stress with eigenvalues treated as `curvature` says. Either part of the Hessian is then positive
+/// semi-definite, since S : form is Σ ⅓ A_T ∇Nᵢ·S ∇Nⱼ.
+fn changed(response: &Response, curvature: Curvature) -> ([[f64; 3]; 3], Strain) {
     let mut moduli = [response.moduli];
-    if curvature != Curvature::Exact {
+    if !is_definite(&moduli[0]) {
         change_dense(&mut moduli, 1, curvature);
     }
-    moduli[0]
+    let [uu, vv, uv] = response.stress;
+    let treated = |eigenvalue: f64| match curvature {
+        Curvature::Exact => eigenvalue,
+        Curvature::Clamped => eigenvalue.max(0.0),
+        Curvature::Absolute => eigenvalue.abs(),
+    };
+    (moduli[0], with_eigenvalues([uu, vv, uv], treated))
 }
 
-/// Writes S : form, the part of the Hessian that is the same for all axes, by pairs of vertices; with eigenvalues
-/// treated as `curvature` says.
-fn isotropic_part(patch: &Patch, stress: Strain, curvature: Curvature, to: &mut Vec<f64>) {
-    to.clear();
-    to.extend(patch.forms.iter().map(|form| weighted(&stress, form)));
-    let count = patch.vertices.len();
-    if curvature == Curvature::Exact || is_semi_definite(to, count) {
-        return;
-    }
-    // The same matrix as a triangle of 3×3 blocks, filled up with zeros.
-    let points = count.div_ceil(3);
-    let mut blocks = vec![[[0.0; 3]; 3]; points * (points + 1) / 2];
-    let mut pair = 0;
-    let entry = |i: usize, j: usize| (triangle_index(points, i / 3, j / 3), i % 3, j % 3);
-    for (i, j) in (0..count).flat_map(|i| (i..count).map(move |j| (i, j))) {
-        let (block, row, column) = entry(i, j);
-        blocks[block][row][column] = to[pair];
-        if i / 3 == j / 3 {
-            blocks[block][column][row] = to[pair];
-        }
-        pair += 1;
-    }
-    change_dense(&mut blocks, points, curvature);
-    pair = 0;
-    for (i, j) in (0..count).flat_map(|i| (i..count).map(move |j| (i, j))) {
-        let (block, row, column) = entry(i, j);
-        to[pair] = blocks[block][row][column];
-        pair += 1;
-    }
+/// Whether Cholesky's factorisation of a matrix has positive pivots.
+fn is_definite(&[[a, b, c], [_, d, e], [_, _, f]]: &[[f64; 3]; 3]) -> bool {
+    let (p, q) = (b / a, c / a);
+    let (second, mixed) = (d - p * b, e - p * c);
+    a > 0.0 && second > 0.0 && f - q * c - mixed / second * mixed > 0.0
 }
 
-/// Whether a matrix, given by its upper triangle, has no negative eigenvalue beyond rounding.
-fn is_semi_definite(upper: &[f64], count: usize) -> bool {
-    let largest = upper.iter().fold(0.0_f64, |largest, entry| largest.max(entry.abs()));
-    let mut rest = upper.to_vec();
-    let at = |i: usize, j: usize| i * (2 * count - i + 1) / 2 + j - i;
-    for k in 0..count {
-        let pivot = rest[at(k, k)] + 1e-12 * largest;
-        if pivot < 0.0 {
-            return false;
-        }
-        for i in k + 1..count {
-            let factor = rest[at(k, i)] / pivot.max(f64::MIN_POSITIVE);
-            for j in i..count {
-                rest[at(i, j)] -= factor * rest[at(k, j)];
-            }
-        }
+/// Subtracts the product of the exact Hessian with the velocities.
+pub(super) fn subtract_product(
+    of: &NodalMembrane,
+    responses: &[Response],
+    state: State<'_>,
+    product: &mut [Vector3<f64>],
+) {
+    let mut rows = Vec::new();
+    for (&patch, response) in of.active.iter().zip(responses) {
+        let patch = &of.patches[patch];
+        rows.clear();
+        patch.append_gradients(state.x, &mut rows);
+        let moved = |(row, &vertex): (&Row<f64>, &usize)| row.map(|[x, y, z, _]| dot([x, y, z], state.v[vertex]));
+        let rates = rows.iter().zip(&patch.vertices).map(moved);
+        let rate = rates.fold([0.0; 3], |sum: [f64; 3], one| std::array::from_fn(|k| sum[k] + one[k]));
+        subtract_gradient(&rows, &patch.vertices, &response.moduli.map(|row| dot(row, rate)), product);
+        // The second part has the form of a gradient, at the velocities.
+        rows.clear();
+        patch.append_gradients(state.v, &mut rows);
+        subtract_gradient(&rows, &patch.vertices, &response.stress, product);
     }
-    true
 }

@@ -172,6 +172,7 @@ fn with_gradient<V: Copy>(value: V, gradient: &[[V; 3]]) -> [V; 4] {
 }
 
 /// Turns derivatives by corners into derivatives by strain.
+#[inline(always)]
 fn response(numbers: &[f64], &[p, q, r]: &[f64; 3], side: f64) -> Response {
     let [g_p, g_q, g_r] = [1, 2, 3].map(|number| side * numbers[number]);
     let s_vv = g_r / r;

@@ -21,6 +21,7 @@ mod fan;
 mod law;
 mod patch;
 mod split;
+mod symmetric;
 mod term;
 
 pub(super) use split::plain_moduli;

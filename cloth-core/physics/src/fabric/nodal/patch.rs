@@ -1,14 +1,14 @@
-//! The mean strain around a vertex, as a quadratic form in the positions of its patch.
+//! The mean Green strain of the triangles around a vertex, and its derivatives.
 //!
-//! For a triangle with the material coordinates X of its corners, E = ½ (FᵀF − 1) with F = Σ x_i ⊗ ∇N_i, where N_i are
-//! the linear weights of its corners. So E, and the mean of E over triangles, is a quadratic form in the positions:
-//!
-//! Ē_k = ½ Σ S_k,ij x_i·x_j − e_k with e = (½, ½, 0)
+//! For a triangle with the weights N of its corners, F = Σ xᵢ ⊗ ∇Nᵢ has the columns u and v, the deformed unit vectors
+//! along warp and weft. E = ½ (FᵀF − 1) = (½ (u·u − 1), ½ (v·v − 1), u·v) for (E_uu, E_vv, 2 E_uv).
 
 use energy_dsl::Vector3;
+use energy_solve::Precision;
 
-use super::fan::{Corner, Fan, rotated};
+use super::fan::{Fan, rotated};
 use super::law::Strain;
+use crate::fabric::patch_blocks::Row;
 use crate::mesh::MaterialTriangle;
 
 /// A vertex with the triangles around it.
@@ -18,11 +18,25 @@ pub(super) struct Patch {
     pub vertices: Vec<usize>,
     /// Position of the vertex itself in `vertices`.
     middle: usize,
-    /// S by pairs i ≤ j of vertices, row by row, in 1/m².
-    pub forms: Vec<Strain>,
+    corners: Vec<Corner>,
     /// A third of the area of its triangles, in m².
     pub area: f64,
 }
+
+/// A triangle of a patch.
+#[derive(Clone, Copy, Debug)]
+struct Corner {
+    /// Positions of the corners beside the middle in [`Patch::vertices`].
+    ends: [usize; 2],
+    /// ∇N of these corners along warp and weft, in 1/m: the rows of D_m⁻¹, where the columns of D_m are the edges from
+    /// the middle.
+    gradients: [[f64; 2]; 2],
+    /// The triangle's area over that of all.
+    share: f64,
+}
+
+/// A vector, padded to four components.
+type Padded = [f64; 4];
 
 impl Patch {
     /// Creates the patch of a fan.
@@ -30,45 +44,30 @@ impl Patch {
         let mut vertices: Vec<usize> = fan.iter().flat_map(|corner| triangles[corner.triangle]).collect();
         vertices.sort_unstable();
         vertices.dedup();
-        let middle = fan.first().map_or(0, |corner| triangles[corner.triangle][corner.corner]);
-        let middle = vertices.partition_point(|&known| known < middle);
-        let mut patch = Self { vertices, middle, forms: Vec::new(), area: 0.0 };
-        patch.fit(fan, triangles, rest);
+        let position = |vertex: usize| vertices.partition_point(|&known| known < vertex);
+        let middle = fan.first().map_or(0, |corner| position(triangles[corner.triangle][corner.corner]));
+        let ends =
+            |at: &super::fan::Corner| [1, 2].map(|step| position(triangles[at.triangle][(at.corner + step) % 3]));
+        let corners = fan.iter().map(|at| Corner { ends: ends(at), gradients: [[0.0; 2]; 2], share: 0.0 }).collect();
+        let mut patch = Self { middle, corners, vertices, area: 0.0 };
+        patch.fit(fan, rest);
         patch
     }
 
     /// Takes the rest shapes of its triangles.
-    pub fn fit(&mut self, fan: &Fan, triangles: &[[usize; 3]], rest: &[MaterialTriangle]) {
-        let double_area = |[[a, b], [c, d]]: [[f64; 2]; 2]| a * d - b * c;
-        let edges = |at: &Corner| {
+    pub fn fit(&mut self, fan: &Fan, rest: &[MaterialTriangle]) {
+        self.area = 0.0;
+        for (corner, at) in self.corners.iter_mut().zip(fan) {
             let plane = rest[at.triangle];
             let [origin, first, second] = [0, 1, 2].map(|step| plane[(at.corner + step) % 3]);
-            [first, second].map(|end| rotated(at.turn, [end[0] - origin[0], end[1] - origin[1]]))
-        };
-        self.area = fan.iter().map(|at| double_area(edges(at)) / 6.0).sum();
-        let count = self.vertices.len();
-        self.forms.clear();
-        self.forms.resize(count * (count + 1) / 2, [0.0; 3]);
-        for at in fan {
-            let [[a, b], [c, d]] = edges(at);
-            let determinant = double_area([[a, b], [c, d]]);
-            let share = determinant / 6.0 / self.area;
-            // ∇N of the ends of the two edges: the rows of D_m⁻¹.
-            let first = [d / determinant, -c / determinant];
-            let second = [-b / determinant, a / determinant];
-            let gradients = [[-first[0] - second[0], -first[1] - second[1]], first, second];
-            let corners = [0, 1, 2].map(|step| {
-                let vertex = triangles[at.triangle][(at.corner + step) % 3];
-                self.vertices.partition_point(|&known| known < vertex)
-            });
-            for (i, &[p, q]) in corners.iter().zip(&gradients) {
-                for (j, &[r, s]) in corners.iter().zip(&gradients).filter(|(j, _)| i <= *j) {
-                    let form = &mut self.forms[i * (2 * count - i + 1) / 2 + j - i];
-                    let parts = [p * r, q * s, p * s + q * r];
-                    (0..3).for_each(|k| form[k] += share * parts[k]);
-                }
-            }
+            let edge = |end: [f64; 2]| rotated(at.turn, [end[0] - origin[0], end[1] - origin[1]]);
+            let ([a, b], [c, d]) = (edge(first), edge(second));
+            let determinant = a * d - b * c;
+            corner.gradients = [[d / determinant, -c / determinant], [-b / determinant, a / determinant]];
+            corner.share = determinant / 6.0;
+            self.area += corner.share;
         }
+        self.corners.iter_mut().for_each(|corner| corner.share /= self.area);
     }
 
     /// Shifts the vertex indices by `first`.
@@ -77,33 +76,91 @@ impl Patch {
         self
     }
 
-    /// Writes the positions relative to the middle.
+    /// Returns the columns of F.
     #[inline(always)]
-    pub fn differences(&self, x: &[Vector3<f64>], to: &mut Vec<Vector3<f64>>) {
-        let middle = x[self.vertices[self.middle]];
-        to.clear();
-        for &vertex in &self.vertices {
-            let at = &x[vertex];
-            to.push([at[0] - middle[0], at[1] - middle[1], at[2] - middle[2]]);
+    fn threads(&self, corner: &Corner, x: &[Vector3<f64>]) -> [Padded; 2] {
+        let middle = &x[self.vertices[self.middle]];
+        let [first, second] = [&x[self.vertices[corner.ends[0]]], &x[self.vertices[corner.ends[1]]]];
+        let [[a, b], [c, d]] = corner.gradients;
+        let (mut u, mut v) = ([0.0; 4], [0.0; 4]);
+        for axis in 0..3 {
+            let (e, f) = (first[axis] - middle[axis], second[axis] - middle[axis]);
+            u[axis] = a * e + c * f;
+            v[axis] = b * e + d * f;
         }
+        [u, v]
     }
 
-    /// Returns the mean strain Ē. `differences` is memory for the positions relative to the middle.
+    /// Returns the mean strain Ē.
     #[inline(always)]
-    pub fn strain(&self, x: &[Vector3<f64>], differences: &mut Vec<Vector3<f64>>) -> Strain {
-        self.differences(x, differences);
-        let (mut sum, mut pair) = ([-0.5, -0.5, 0.0], 0);
-        for (i, a) in differences.iter().enumerate() {
-            for (j, b) in differences.iter().enumerate().skip(i) {
-                let product = a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-                let weight = if i == j { 0.5 * product } else { product };
-                let form = &self.forms[pair];
-                for k in 0..3 {
-                    sum[k] += weight * form[k];
+    pub fn strain(&self, x: &[Vector3<f64>]) -> Strain {
+        let mut strain = [0.0; 3];
+        for corner in &self.corners {
+            let [u, v] = self.threads(corner, x);
+            strain[0] += corner.share * (0.5 * (product(&u, &u) - 1.0));
+            strain[1] += corner.share * (0.5 * (product(&v, &v) - 1.0));
+            strain[2] += corner.share * product(&u, &v);
+        }
+        strain
+    }
+
+    /// Appends ∂Ē/∂x of its vertices.
+    #[inline(always)]
+    pub fn append_gradients(&self, x: &[Vector3<f64>], all: &mut Vec<Row<f64>>) {
+        let first = all.len();
+        all.resize(first + self.vertices.len(), [[0.0; 4]; 3]);
+        let to = &mut all[first..];
+        let mut of_middle = [[0.0; 4]; 3];
+        for corner in &self.corners {
+            let [u, v] = self.threads(corner, x);
+            for end in 0..2 {
+                let [along, across] = corner.gradients[end].map(|component| corner.share * component);
+                let row = &mut to[corner.ends[end]];
+                for axis in 0..4 {
+                    let (uu, vv) = (along * u[axis], across * v[axis]);
+                    let uv = along * v[axis] + across * u[axis];
+                    row[0][axis] += uu;
+                    row[1][axis] += vv;
+                    row[2][axis] += uv;
+                    // A translation strains nothing.
+                    of_middle[0][axis] -= uu;
+                    of_middle[1][axis] -= vv;
+                    of_middle[2][axis] -= uv;
                 }
-                pair += 1;
             }
         }
-        sum
+        to[self.middle] = of_middle;
     }
+
+    /// Appends k with S : ∂²Ē/∂xᵢ∂xⱼ = kᵢⱼ 1, by pairs i ≤ j of its vertices.
+    #[inline(always)]
+    pub fn append_stress_stiffness<T: Precision>(&self, &[s_uu, s_vv, s_uv]: &Strain, all: &mut Vec<T>) {
+        let (first_pair, count) = (all.len(), self.vertices.len());
+        all.resize(first_pair + count * (count + 1) / 2, T::from_f64(0.0));
+        let to = &mut all[first_pair..];
+        let mut add = |i: usize, j: usize, stiffness: f64| {
+            let (i, j) = (i.min(j), i.max(j));
+            let sum = &mut to[i * (2 * count - i + 1) / 2 + j - i];
+            *sum = *sum + T::from_f64(stiffness);
+        };
+        for corner in &self.corners {
+            let [[a, b], [c, d]] = corner.gradients;
+            let share = corner.share;
+            let [(p, q), (r, s)] =
+                [(a, b), (c, d)].map(|(a, b)| (share * (s_uu * a + s_uv * b), share * (s_uv * a + s_vv * b)));
+            let (first, mixed, second) = (p * a + q * b, p * c + q * d, r * c + s * d);
+            let ([i, j], middle) = (corner.ends, self.middle);
+            add(i, i, first);
+            add(j, j, second);
+            add(i, j, mixed);
+            add(i, middle, -first - mixed);
+            add(j, middle, -second - mixed);
+            add(middle, middle, first + 2.0 * mixed + second);
+        }
+    }
+}
+
+#[inline(always)]
+fn product(a: &Padded, b: &Padded) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }

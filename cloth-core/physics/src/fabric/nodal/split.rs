@@ -3,6 +3,7 @@
 use energy_dsl::{PackedPotential, RestError};
 
 use super::law::{Order, StrainLaw, TriangleLaw};
+use super::symmetric::with_eigenvalues;
 use super::term::{Moduli, RestShapes};
 use crate::fabric::locking::Folds;
 use crate::mesh::MaterialTriangle;
@@ -31,14 +32,8 @@ pub(in super::super) fn plain_moduli<E: PackedPotential<f64> + std::fmt::Debug +
 /// Eigenvalues refer to the strain (E_uu, E_vv, √2 E_uv), which turns with the frame like a vector. Couplings of stretch
 /// with shear are dropped.
 fn cut(moduli: &Moduli, largest: f64) -> (Moduli, bool) {
-    let [[a, b, _], [_, d, _], [_, _, shear]] = *moduli;
-    let (middle, radius) = (0.5 * (a + d), (0.5 * (a - d)).hypot(b));
-    let [upper, lower] = [middle + radius, middle - radius].map(|value| value.clamp(0.0, largest));
-    // The projections onto the eigenvectors are ½ (1 ± N), where N is the traceless part over its radius.
-    let (mean, half) = (0.5 * (upper + lower), 0.5 * (upper - lower));
-    let per_radius = if radius > 0.0 { half / radius } else { 0.0 };
-    let (across, coupling) = (0.5 * (a - d) * per_radius, b * per_radius);
-    let cut =
-        [[mean + across, coupling, 0.0], [coupling, mean - across, 0.0], [0.0, 0.0, shear.clamp(0.0, 0.5 * largest)]];
-    (cut, middle + radius > largest || shear > 0.5 * largest)
+    let [[uu, uv, _], [_, vv, _], [_, _, shear]] = *moduli;
+    let [a, d, b] = with_eigenvalues([uu, vv, uv], |eigenvalue| eigenvalue.clamp(0.0, largest));
+    let is_cut = 0.5 * (uu + vv) + (0.5 * (uu - vv)).hypot(uv) > largest || shear > 0.5 * largest;
+    ([[a, b, 0.0], [b, d, 0.0], [0.0, 0.0, shear.clamp(0.0, 0.5 * largest)]], is_cut)
 }

@@ -1,16 +1,17 @@
 use std::fmt;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
-use energy_dsl::{Declaration, PackedPotential, RestError, Vector3};
+use energy_dsl::{Declaration, PackedPotential, RestError, Vector3, dispatch};
 use energy_solve::{
-    Blocks, Character, DofMap, Linearisation, Pattern, PlacedTerm, Quantity, Restriction, State, Stencils, Storage,
-    Tally, Term, TermDescription, index,
+    Blocks, Character, DofMap, Linearisation, Pattern, PlacedTerm, Quantity, Restriction, State, Stencils, Tally, Term,
+    TermDescription,
 };
 
-use super::assembly::{Assembly, PatchSlots};
+use super::assembly::{Forces, Hessians, Strains, subtract_product};
 use super::fan::{Fan, fans};
-use super::law::{Order, Response, Strain, StrainLaw, TriangleLaw};
+use super::law::{Order, Response, StrainLaw, TriangleLaw};
 use super::patch::Patch;
+use crate::fabric::patch_blocks::{PatchSlots, padded_stencils};
 use crate::fabric::plasticity::flowed;
 use crate::geometry::dot;
 use crate::mesh::{MaterialTriangle, TriangleMesh};
@@ -112,14 +113,10 @@ impl NodalMembrane {
         let patches: Vec<Patch> = fans.iter().map(patch).collect();
         let triangles = mesh.triangles().iter().map(|corners| corners.map(|vertex| first + vertex)).collect();
         let areas: Vec<f64> = patches.iter().map(|patch| patch.area).collect();
-        let arity = patches.iter().map(|patch| patch.vertices.len()).max().unwrap_or(1);
-        let padded = |patch: &Patch| {
-            let filled = std::iter::repeat_n(patch.vertices[0], arity - patch.vertices.len());
-            patch.vertices.clone().into_iter().chain(filled).map(index)
-        };
+        let (stencils, arity) = padded_stencils(patches.iter().map(|patch| &patch.vertices[..]));
         Ok(Self {
             name,
-            stencils: patches.iter().flat_map(padded).collect(),
+            stencils,
             arity,
             plain,
             active: Vec::new(),
@@ -138,8 +135,7 @@ impl NodalMembrane {
 
     /// Evaluates the patches with a free vertex: A_v (W(Ē) − ½ Ē : C_v : Ē) and its derivatives by Ē.
     fn responses(&self, x: &[Vector3<f64>], order: Order) -> (Vec<Response>, u64) {
-        let (mut differences, active) = (Vec::new(), self.active.iter().map(|&patch| &self.patches[patch]));
-        let strains: Vec<Strain> = active.map(|patch| patch.strain(x, &mut differences)).collect();
+        let strains = dispatch(Strains { of: self, x });
         let (mut all, flagged) = self.law.respond(&strains, order);
         for ((response, strain), &patch) in all.iter_mut().zip(&strains).zip(&self.active) {
             for i in 0..3 {
@@ -165,7 +161,7 @@ impl NodalMembrane {
     fn fit(&mut self) {
         let Some(flow) = &self.flow else { return };
         for (patch, fan) in self.patches.iter_mut().zip(&flow.fans) {
-            patch.fit(fan, &flow.triangles, &flow.rest);
+            patch.fit(fan, &flow.rest);
         }
         let areas: Vec<f64> = self.active.iter().map(|&patch| self.patches[patch].area).collect();
         // Rest shapes that the elements refuse are not taken.
@@ -199,23 +195,7 @@ impl Term for NodalMembrane {
         self.active =
             (0..self.patches.len()).filter(|&patch| self.patches[patch].vertices.iter().any(is_free)).collect();
         self.law = self.law.selected(&self.active);
-        let slot = |i: usize, j: usize| {
-            let rows = dofs.row(i).zip(dofs.row(j));
-            index(rows.and_then(|(row, column)| pattern.slot(row, column)).map_or(pattern.nowhere(), |(slot, _)| slot))
-        };
-        let slots = |&patch: &usize| {
-            let vertices = &self.patches[patch].vertices;
-            let pairs =
-                || (0..vertices.len()).flat_map(|i| (i..vertices.len()).map(move |j| (vertices[i], vertices[j])));
-            // Vertices ascend, and so do their rows: no block of the upper triangle needs transposing.
-            PatchSlots {
-                slots: pairs().map(|(i, j)| slot(i, j)).collect(),
-                mirrored: match pattern.storage() {
-                    Storage::Upper => Vec::new(),
-                    Storage::Whole => pairs().map(|(i, j)| slot(j, i)).collect(),
-                },
-            }
-        };
+        let slots = |&patch: &usize| PatchSlots::new(&self.patches[patch].vertices, dofs, pattern);
         self.slots = self.active.iter().map(slots).collect();
         self
     }
@@ -290,21 +270,20 @@ impl PlacedTerm for NodalMembrane {
 
     fn add_force(&self, state: State<'_>, force: &mut [Vector3<f64>]) -> Tally {
         let (responses, flagged) = self.linearised(state.x, Order::Gradient);
-        Assembly { of: self, responses: &responses, x: state.x }.subtract_gradient(force);
+        dispatch(Forces { of: self, responses: &responses, x: state.x, force });
         self.tally(flagged)
     }
 
     fn add_linearisation(&self, state: State<'_>, sum: &mut Linearisation<'_>) -> Tally {
         let (responses, flagged) = self.linearised(state.x, Order::Hessian);
-        let assembly = Assembly { of: self, responses: &responses, x: state.x };
-        assembly.subtract_gradient(sum.force);
         if let Some(product) = &mut sum.stiffness_times_velocity {
-            assembly.subtract_product(state.v, product);
+            subtract_product(self, &responses, state, product);
         }
-        let (scale, curvature) = (-sum.weights.position, sum.curvature);
+        let (scale, curvature, force) = (-sum.weights.position, sum.curvature, &mut *sum.force);
+        let (of, responses, x) = (self, &responses[..], state.x);
         match &mut sum.matrix {
-            Blocks::Single(matrix) => assembly.add_hessian(scale, curvature, matrix),
-            Blocks::Double(matrix) => assembly.add_hessian(scale, curvature, matrix),
+            Blocks::Single(matrix) => dispatch(Hessians { of, responses, x, scale, curvature, force, matrix }),
+            Blocks::Double(matrix) => dispatch(Hessians { of, responses, x, scale, curvature, force, matrix }),
         }
         self.tally(flagged)
     }

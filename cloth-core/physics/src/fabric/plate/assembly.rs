@@ -4,7 +4,8 @@ use energy_dsl::{BLOCK, Batch, BatchWork, Block, Kernel, Lane, Level, Potential,
 use energy_elements::ArcAngle;
 use energy_solve::{Linearisation, Precision, TriangleBuffer};
 
-use super::term::{Angles, PatchSlots, PlateTerm, Row};
+use super::term::{Angles, PlateTerm};
+use crate::fabric::patch_blocks::{Factors, GROUP, Row};
 
 /// Number of entries in the upper triangle of ∇²θ.
 const HESSIAN: usize = 90;
@@ -98,78 +99,21 @@ impl<T: Precision> Kernel for OuterProducts<'_, T> {
                 of.patches[patch].append_gradients(&angles.gradients, &mut rows);
             }
             // Written in place: pushes would spill the registers.
-            factors.resize(rows.len(), [Factors::new(s, &[T::from_f64(0.0); 4]); 3]);
+            factors.resize(rows.len(), [Factors::zeros(); 3]);
             for (factors, row) in factors.iter_mut().zip(&rows) {
                 // `black_box` keeps LLVM from vectorising this loop with scatters, which take longer than the rest.
                 let factors = std::hint::black_box(factors);
                 for k in 0..3 {
-                    factors[k] = Factors::new(s, &row[k]);
+                    let [a, b, c, d] = row[k];
+                    factors[k] = Factors::new(&[s * a, s * b, s * c, d], &row[k]);
                 }
             }
             let mut left = &factors[..];
             for patch_slots in patch_slots {
                 let (own, others) = left.split_at(patch_slots.vertices);
-                add_outer_products(own, patch_slots, matrix);
+                patch_slots.add(own, None, matrix);
                 left = others;
             }
         }
     }
-}
-
-/// Patches whose rows are computed before any is used. A processor cannot forward a recent store to a wider load.
-const GROUP: usize = 8;
-
-/// Adds s ∇r ∇rᵀ of one patch, given the factors of its vertices.
-#[inline(always)]
-fn add_outer_products<T: Precision>(factors: &[[Factors<T>; 3]], patch_slots: &PatchSlots, matrix: &mut [Block<T>]) {
-    let (mut slots, mut mirrored) = (patch_slots.slots.iter(), patch_slots.mirrored.iter());
-    for i in 0..factors.len() {
-        for j in i..factors.len() {
-            let Some(&slot) = slots.next() else { return };
-            add_outer_product(&mut matrix[slot as usize], &factors[i], &factors[j]);
-            if i != j
-                && let Some(&slot) = mirrored.next()
-            {
-                add_outer_product(&mut matrix[slot as usize], &factors[j], &factors[i]);
-            }
-        }
-    }
-}
-
-/// A vector as the factors of a block, by entries: the first eight are added in one register.
-#[derive(Clone, Copy)]
-struct Factors<T> {
-    /// s a, each component three times.
-    left: [T; 8],
-    /// a, repeated.
-    right: [T; 8],
-    /// The factors of the last entry.
-    last: [T; 2],
-}
-
-impl<T: Precision> Factors<T> {
-    #[inline(always)]
-    fn new(s: T, vector: &[T; 4]) -> Self {
-        let [a, b, c, _] = *vector;
-        let (x, y, z) = (s * a, s * b, s * c);
-        Self { left: [x, x, x, y, y, y, z, z], right: [a, b, c, a, b, c, a, b], last: [z, c] }
-    }
-}
-
-/// A ← A + s Σ aₖ bₖᵀ.
-#[inline(always)]
-fn add_outer_product<T: Precision>(sum: &mut Block<T>, a: &[Factors<T>; 3], b: &[Factors<T>; 3]) {
-    // All products come before the first sum is written: the compiler cannot tell that A is apart from the factors.
-    let product = |k: usize, entry: usize| a[k].left[entry] * b[k].right[entry];
-    let last = |k: usize| a[k].last[0] * b[k].last[1];
-    let mut eight = [T::from_f64(0.0); 8];
-    for entry in 0..8 {
-        eight[entry] = product(0, entry) + product(1, entry) + product(2, entry);
-    }
-    let ninth = last(0) + last(1) + last(2);
-    let sum = sum.as_flattened_mut();
-    for entry in 0..8 {
-        sum[entry] = sum[entry] + eight[entry];
-    }
-    sum[8] = sum[8] + ninth;
 }

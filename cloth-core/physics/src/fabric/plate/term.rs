@@ -7,12 +7,13 @@ use energy_dsl::{
 use energy_elements::ArcAngle;
 use energy_solve::{
     Blocks, Character, Curvature as CurvaturePolicy, DofMap, Linearisation, Pattern, PlacedTerm, Precision, Quantity,
-    Restriction, ScatterMaps, State, Stencils, Storage, Tally, Term, TermDescription, index,
+    Restriction, ScatterMaps, State, Stencils, Tally, Term, TermDescription, index,
 };
 
 use super::assembly::{CurvedPart, OuterProducts};
 use super::rigidity::cholesky;
 use super::{Curvature, Rigidity, RigidityError, ThreadError, curvatures};
+use crate::fabric::patch_blocks::{PatchSlots, Row, padded_stencils};
 use crate::fabric::plasticity::{angle_of_curvature, flow};
 use crate::geometry::dot;
 use crate::mesh::Warp;
@@ -48,9 +49,6 @@ pub struct PlateTerm {
     found: AtomicU64,
 }
 
-/// Three vectors, each padded to four components.
-pub(super) type Row<T> = [[T; 4]; 3];
-
 /// A triangle and the hinges that its curvature depends on.
 #[derive(Clone, Debug)]
 pub(super) struct Patch {
@@ -71,23 +69,6 @@ struct Angle {
     hinge: usize,
     b: [f64; 3],
     local: [u8; 4],
-}
-
-/// Slots of the blocks of a patch: of the pairs i ≤ j, and of the mirrored pairs if the matrix stores both triangles.
-#[derive(Clone, Debug)]
-pub(super) struct PatchSlots {
-    /// The number of vertices of the patch.
-    pub(super) vertices: usize,
-    pub(super) slots: Vec<u32>,
-    pub(super) mirrored: Vec<u32>,
-}
-
-impl PatchSlots {
-    /// Returns the slots in a restricted matrix.
-    fn restricted(&self, restriction: &Restriction<'_>) -> Self {
-        let slots = |slots: &[u32]| slots.iter().map(|&slot| restriction.slot(slot)).collect();
-        Self { vertices: self.vertices, slots: slots(&self.slots), mirrored: slots(&self.mirrored) }
-    }
 }
 
 /// A plate that does not fit a mesh.
@@ -122,12 +103,7 @@ impl PlateTerm {
         let woven = matches!(rigidity, Rigidity::Orthotropic { .. });
         let curvatures = curvatures(mesh, &topology, woven.then(|| warp.into()))?;
         let patches: Vec<Patch> = curvatures.iter().filter_map(|one| Patch::new(one, &factor, &hinges)).collect();
-        let arity = patches.iter().map(|patch| patch.vertices.len()).max().unwrap_or(1);
-        let mut stencils = Vec::with_capacity(arity * patches.len());
-        for patch in &patches {
-            let filled = std::iter::repeat_n(&patch.vertices[0], arity - patch.vertices.len());
-            stencils.extend(patch.vertices.iter().chain(filled).copied().map(index));
-        }
+        let (stencils, arity) = padded_stencils(patches.iter().map(|patch| &patch.vertices[..]));
         Ok(Self {
             name: name.into(),
             hinges,
@@ -418,23 +394,8 @@ impl Term for PlateTerm {
         self.needed = needed;
         let vertices: Vec<u32> = self.needed.iter().flat_map(|&hinge| self.hinges[hinge].map(index)).collect();
         self.hinge_slots = ScatterMaps::of_all(Stencils::new(4, &vertices), dofs, pattern);
-        let slot = |i: usize, j: usize| {
-            let rows = dofs.row(i).zip(dofs.row(j));
-            index(rows.and_then(|(row, column)| pattern.slot(row, column)).map_or(pattern.nowhere(), |(slot, _)| slot))
-        };
-        self.patch_slots.clear();
-        for &patch in &self.active {
-            let vertices = &self.patches[patch].vertices;
-            let pairs =
-                || (0..vertices.len()).flat_map(|i| (i..vertices.len()).map(move |j| (vertices[i], vertices[j])));
-            // Vertices ascend, and so do their rows: no block of the upper triangle needs transposing.
-            let slots = pairs().map(|(i, j)| slot(i, j)).collect();
-            let mirrored = match pattern.storage() {
-                Storage::Upper => Vec::new(),
-                Storage::Whole => pairs().filter(|(i, j)| i != j).map(|(i, j)| slot(j, i)).collect(),
-            };
-            self.patch_slots.push(PatchSlots { vertices: vertices.len(), slots, mirrored });
-        }
+        let slots = |&patch: &usize| PatchSlots::new(&self.patches[patch].vertices, dofs, pattern);
+        self.patch_slots = self.active.iter().map(slots).collect();
         self
     }
 }
