@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use crate::Body;
 use crate::barrier::{BarrierContact, ContactError, GAP_PER_THICKNESS, thinning};
 use crate::collision::CollisionMesh;
-use crate::fabric::{self, Bending, Fabric, FabricError, Material, Membrane, Surroundings};
+use crate::fabric::{self, Bending, Fabric, FabricError, Material, Membrane, Strain, Surroundings};
 use crate::integrator::StepError;
 use crate::mesh::{Diagonals, MeshError, Plane, Sheet, SpringNetwork};
 
@@ -38,7 +38,9 @@ impl Cloth {
             Self::Cotton => (0.1503, 261.0, 0.243, 1.56e-6),
         };
         let bending = Bending::Flat { stiffness };
-        Fabric::new(density, Material::NeoHookean(Membrane { stretch_stiffness, poisson_ratio, bending }))
+        // The peers' triangles have their own strain.
+        let material = Material::NeoHookean(Membrane { stretch_stiffness, poisson_ratio, bending });
+        Fabric { strain: Strain::PerTriangle, ..Fabric::new(density, material) }
     }
 }
 

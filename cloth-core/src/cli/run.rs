@@ -4,6 +4,7 @@ use std::process::ExitCode;
 use anyhow::Result;
 use clap::{Args, ValueEnum};
 use cloth_core::output::OutputFolder;
+use cloth_core::physics::fabric::Locking;
 use cloth_core::run::{Ending, Event, Forecast, Log, Progress, Run, RunError, RunOptions, stats};
 use cloth_core::scene::{self, Scene};
 use energy_cli::{Interrupts, Notice, tell};
@@ -107,6 +108,17 @@ fn dry_run(text: &str, path: &Path, threads: Option<u16>, log: LogChoice) -> Res
     let forecast = Forecast::of(text, path, threads.map(usize::from))?;
     if log == LogChoice::Json {
         let memory = forecast.memory.total();
+        let locking = |(garment, locking): &(String, Locking)| {
+            json!({
+                "garment": garment,
+                "edge": locking.edge,
+                "stiffness": locking.stiffness,
+                "wasted": locking.wasted,
+                "is_avoided": locking.is_avoided,
+                "sufficient_edge": locking.sufficient_edge,
+                "sufficient_stiffness": locking.sufficient_stiffness,
+            })
+        };
         print_event(&json!({
             "event": "forecast",
             "vertices": forecast.vertices,
@@ -118,6 +130,7 @@ fn dry_run(text: &str, path: &Path, threads: Option<u16>, log: LogChoice) -> Res
             "available_memory": forecast.available,
             "seconds": forecast.time(),
             "warnings": forecast.warnings,
+            "locking": forecast.locking.iter().map(locking).collect::<Vec<_>>(),
             "failure": forecast.failure.as_ref().map(ToString::to_string),
         }))?;
     } else {

@@ -19,7 +19,7 @@ use super::soft_pin::{Held, SoftPinTerm};
 use super::{PinError, SeamError, pins, seam};
 use crate::Coulomb;
 use crate::contact::AnySolid;
-use crate::fabric::{self, Hair, StitchDamping, Surroundings, SystemPart};
+use crate::fabric::{self, Hair, Locking, StitchDamping, Surroundings, SystemPart};
 use crate::geometry::{Pose, add_scaled, norm, subtract};
 use crate::mesh::{CornerAttributes, DisjointSets, SpringNetwork, Topology, TriangleMesh};
 use crate::motion::Motion;
@@ -245,6 +245,24 @@ impl<'a> Builder<'a> {
         let left_out: Vec<String> = applied.left_out.into_iter().filter(|reason| !acts(reason)).collect();
         add_once(&mut self.model.left_out, left_out);
         add_once(&mut self.model.warnings, applied.warnings);
+        if let Some(locking) = applied.locking {
+            self.note_locking(self.model.parts[piece.part].name.clone(), locking);
+        }
+    }
+
+    /// Keeps the estimate of the piece of a garment that locks most.
+    fn note_locking(&mut self, garment: String, locking: Locking) {
+        match self.model.locking.iter_mut().find(|(known, _)| *known == garment) {
+            Some((_, known)) if known.wasted >= locking.wasted => {}
+            Some((_, known)) => *known = locking,
+            None => self.model.locking.push((garment, locking)),
+        }
+    }
+
+    /// Warns of garments that bend too stiffly.
+    fn warn_of_locking(&mut self) {
+        let locked = self.model.locking.iter().filter(|(_, locking)| locking.locks());
+        self.model.warnings.extend(locked.map(|(garment, locking)| format!("garment `{garment}`: {locking}")));
     }
 
     fn apply_fabrics(&mut self) -> Result<(), ModelError> {
@@ -258,6 +276,7 @@ impl<'a> Builder<'a> {
                 self.add_applied(piece, since, applied?);
             }
         }
+        self.warn_of_locking();
         Ok(())
     }
 

@@ -12,7 +12,7 @@ use super::{ExclusionError, PinError, SeamError};
 use crate::Coulomb;
 use crate::collision::Exclusions;
 use crate::contact::Obstacle;
-use crate::fabric::FabricError;
+use crate::fabric::{FabricError, Locking};
 use crate::mesh::{CornerAttributes, TriangleMesh};
 use crate::motion::Motion;
 use crate::scene::{MeshSourceError, ObstacleError, Scene};
@@ -145,6 +145,8 @@ pub struct Model {
     pub notes: Vec<String>,
     /// Warnings about the scene.
     pub warnings: Vec<String>,
+    /// Estimates of locking, with the names of the garments.
+    pub locking: Vec<(String, Locking)>,
     /// Obstacles, with their motions.
     pub obstacles: Vec<Obstacle>,
     /// Pairs of features that do not collide.

@@ -8,6 +8,7 @@ use super::available_memory::available_memory;
 use super::memory_need::{Gigabytes, MemoryNeed};
 use super::progress_lines::Seconds;
 use super::{RunError, available_threads};
+use crate::fabric::Locking;
 use crate::scene::Scene;
 use crate::simulation::{Simulation, SimulationError};
 
@@ -30,6 +31,8 @@ pub struct Forecast {
     pub available: Option<u64>,
     /// Warnings about the scene.
     pub warnings: Vec<String>,
+    /// Estimates of locking, with the names of the garments.
+    pub locking: Vec<(String, Locking)>,
     /// Steps that were taken to measure the time.
     pub measured_steps: u64,
     /// The mean time of these steps.
@@ -71,6 +74,7 @@ impl Forecast {
             memory,
             available,
             warnings: simulation.warnings().to_vec(),
+            locking: simulation.locking().to_vec(),
             measured_steps,
             step_time: started.elapsed() / u32::try_from(measured_steps.max(1)).unwrap_or(u32::MAX),
             failure,
@@ -90,6 +94,10 @@ impl fmt::Display for Forecast {
         writeln!(f, "{} steps, {} frames", self.steps, self.frames)?;
         let available = self.available.map(|bytes| format!(", {} are available", Gigabytes(bytes as f64)));
         writeln!(f, "memory: about {}{}", Gigabytes(self.memory.total()), available.unwrap_or_default())?;
+        // Those that lock are among the warnings.
+        for (garment, locking) in self.locking.iter().filter(|(_, locking)| !locking.locks()) {
+            writeln!(f, "{garment}: {locking}")?;
+        }
         match &self.failure {
             Some(failure) => write!(f, "it fails after {} steps: {failure}", self.measured_steps),
             None => write!(

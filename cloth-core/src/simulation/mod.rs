@@ -33,6 +33,7 @@ use crate::Body;
 use crate::barrier::ContactError;
 use crate::collision::{CollisionMesh, Crossing, Exclusions, crossings};
 use crate::contact::Obstacle;
+use crate::fabric::Locking;
 use crate::integrator::{StepError, StepReport};
 use crate::ledger::Ledger;
 use crate::measure::StrainGauge;
@@ -117,6 +118,8 @@ pub struct Simulation {
     prescribed: Prescribed,
     /// Pairs of features that do not collide.
     exclusions: Exclusions,
+    /// Estimates of locking, with the names of the garments.
+    locking: Vec<(String, Locking)>,
     contact: ContactChoice,
     x: Vec<Vector3<f64>>,
     v: Vec<Vector3<f64>>,
@@ -181,7 +184,9 @@ impl Simulation {
         let prescribed = Prescribed::new(&model.obstacles);
         let obstacle_mesh = collision_mesh.clone().with_obstacles(&prescribed.cores());
         let gauges = reading::gauges(scene, &model);
-        let Model { parts, x, v, masses, triangles, pinned, pins, motions, labels, obstacles, exclusions, .. } = model;
+        let Model {
+            parts, x, v, masses, triangles, pinned, pins, motions, labels, obstacles, exclusions, locking, ..
+        } = model;
         let mut simulation = Self {
             parts,
             triangles,
@@ -192,6 +197,7 @@ impl Simulation {
             obstacle_mesh,
             prescribed,
             exclusions,
+            locking,
             contact: scene.contact,
             accelerations: vec![[0.0; 3]; x.len()],
             pins,
@@ -356,6 +362,12 @@ impl Simulation {
     #[must_use]
     pub fn warnings(&self) -> &[String] {
         &self.summary.warnings
+    }
+
+    /// Returns an estimate, for each garment that has one, of how much its mesh stiffens folds.
+    #[must_use]
+    pub fn locking(&self) -> &[(String, Locking)] {
+        &self.locking
     }
 
     /// Starts a ledger; every later step adds an entry.

@@ -17,6 +17,7 @@ mod impacts;
 mod knots;
 mod lateral_buckling;
 mod linking;
+mod locking;
 mod long_run;
 mod modes;
 mod momentum;
@@ -136,8 +137,18 @@ pub enum ValidateError {
 }
 
 /// Names of the questions.
-pub const QUESTIONS: [&str; 9] =
-    ["cantilever", "buckling", "catenary", "hanging-strip", "modes", "orders", "momentum", "contact", "long-run"];
+pub const QUESTIONS: [&str; 10] = [
+    "cantilever",
+    "buckling",
+    "catenary",
+    "hanging-strip",
+    "modes",
+    "orders",
+    "momentum",
+    "contact",
+    "locking",
+    "long-run",
+];
 
 /// Answers the named questions, or all if `names` is empty, and calls `report` with each finding. `quick` skips the
 /// finer meshes.
@@ -146,7 +157,7 @@ pub const QUESTIONS: [&str; 9] =
 /// Returns an error if a case cannot be set up or solved.
 pub fn ask(names: &[String], quick: bool, mut report: impl FnMut(&Finding)) -> Result<Vec<Finding>, ValidateError> {
     type Ask = fn(bool, &mut dyn FnMut(Finding)) -> Result<(), ValidateError>;
-    let all: [Ask; 9] = [
+    let all: [Ask; 10] = [
         cantilever::ask,
         lateral_buckling::ask,
         catenary::ask,
@@ -155,6 +166,7 @@ pub fn ask(names: &[String], quick: bool, mut report: impl FnMut(&Finding)) -> R
         orders::ask,
         momentum::ask,
         contact::ask,
+        locking::ask,
         long_run::ask,
     ];
     let mut findings = Vec::new();

@@ -24,6 +24,7 @@ pub use description::{
 pub use error::FabricError;
 pub use hair::{Hair, hair_terms};
 pub use library::{LIBRARY, LibraryFabric, UnknownFabric, in_library};
+pub use locking::Locking;
 pub use plate::{PlateTerm, Rigidity};
 pub use terms::{FabricTerms, Surroundings, SystemPart, terms, terms_at};
 pub use warp_choice::MaybeWarpChoice;

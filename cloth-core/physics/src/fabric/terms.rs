@@ -9,7 +9,7 @@ use energy_solve::{DissipationTerm, DrivenTerm, ElementList, ForceTerm, ListErro
 use super::damping::{HingeDamping, MembraneDamping};
 use super::declared::{Declared, TargetMesh};
 use super::error::FabricError;
-use super::locking::Folds;
+use super::locking::{Folds, Locking};
 use super::nodal::{self, NodalMembrane, RestShapes};
 use super::plasticity::{PlasticHinges, PlasticMembrane, angle_of_curvature};
 use super::plate::{PlateTerm, Rigidity, ThreadError};
@@ -48,6 +48,8 @@ pub struct FabricTerms {
     pub left_out: Vec<String>,
     /// Warnings about the fabric.
     pub warnings: Vec<String>,
+    /// An estimate of locking; `None` without a membrane or bending resistance, and for springs and declared elements.
+    pub locking: Option<Locking>,
     part: SystemPart,
 }
 
@@ -80,7 +82,8 @@ pub fn terms_at(
     let plasticity = fabric.plasticity.unwrap_or_default();
     let (triangles, is_woven) = material_triangles(mesh, fabric)?;
     let folds = folds(fabric, surroundings)?;
-    let cloth = MaterialMesh { mesh, triangles, is_woven, warp: fabric.warp, plasticity, folds };
+    let (warp, strain) = (fabric.warp, fabric.strain);
+    let cloth = MaterialMesh { mesh, triangles, is_woven, warp, plasticity, strain, folds };
     check_plasticity(fabric)?;
     // λ and μ for small strains; damping is proportional to them.
     let stiffness = match &fabric.material {
@@ -160,15 +163,13 @@ struct MaterialMesh<'a> {
     is_woven: bool,
     warp: Warp,
     plasticity: Plasticity,
-    /// The folds that the membrane must not lock; `None` for plain triangles.
-    folds: Option<Folds>,
+    strain: Strain,
+    /// The folds that the membrane should not lock.
+    folds: Folds,
 }
 
-/// Returns the folds that the membrane must not lock; `None` for plain triangles.
-fn folds(fabric: &Fabric, surroundings: &Surroundings) -> Result<Option<Folds>, FabricError> {
-    if fabric.strain == Strain::PerTriangle || matches!(fabric.material, Material::MassSpring(_) | Material::File(_)) {
-        return Ok(None);
-    }
+/// Returns the folds that the membrane should not lock.
+fn folds(fabric: &Fabric, surroundings: &Surroundings) -> Result<Folds, FabricError> {
     let rigidity = match fabric.material.bending() {
         Some(Bending::Plate(plate)) => {
             let [[along_warp, ..], [_, along_weft, _], _] = plate.matrix()?;
@@ -178,7 +179,7 @@ fn folds(fabric: &Fabric, surroundings: &Surroundings) -> Result<Option<Folds>, 
     };
     // Folds without gravity are judged as if there were some.
     let gravity = Some(norm(surroundings.gravity)).filter(|&gravity| gravity > 0.0).unwrap_or(9.81);
-    Ok(Some(Folds { rigidity, weight: gravity * fabric.density }))
+    Ok(Folds { rigidity, weight: gravity * fabric.density })
 }
 
 /// Returns an error if something would have to yield that cannot.
@@ -238,7 +239,7 @@ fn stable_neo_hookean_log(
 
 impl FabricTerms {
     pub(super) fn new(masses: Vec<f64>, part: SystemPart) -> Self {
-        Self { masses, terms: Vec::new(), left_out: Vec::new(), warnings: Vec::new(), part }
+        Self { masses, terms: Vec::new(), left_out: Vec::new(), warnings: Vec::new(), locking: None, part }
     }
 
     fn add_springs(
@@ -288,12 +289,20 @@ impl FabricTerms {
         if self.leave_out(name, is_zero, cloth.triangles.len()) {
             return Ok(());
         }
-        let Some(folds) = cloth.folds else { return self.add_triangles(name, cloth, move |_, rest| element(rest)) };
         let at_rest = |source| FabricError::Rest { triangle: 0, source };
+        let moduli = nodal::moduli_at_rest(&element).map_err(at_rest)?;
         let shapes = RestShapes::new(cloth.mesh, &cloth.triangles, cloth.is_woven);
-        let Some(plain) = nodal::plain_moduli(&shapes, folds, &element).map_err(at_rest)? else {
-            return self.add_triangles(name, cloth, move |_, rest| element(rest));
+        let plain = match cloth.strain {
+            Strain::Nodal => nodal::plain_moduli(&shapes, &cloth.folds, &moduli),
+            Strain::PerTriangle => None,
         };
+        let edges = shapes.edge_lengths();
+        let edge = edges.iter().sum::<f64>() / edges.len() as f64;
+        let locking = Locking::new(&cloth.folds, nodal::tensile_stiffness(&moduli), edge, plain.is_some());
+        if self.locking.is_none_or(|known| known.stiffness < locking.stiffness) && locking.wasted.is_normal() {
+            self.locking = Some(locking);
+        }
+        let Some(plain) = plain else { return self.add_triangles(name, cloth, move |_, rest| element(rest)) };
         let of_triangles = shapes.means_of_corners(&plain);
         self.add_triangles(name, cloth, move |triangle, [u0, u1, u2]| {
             let [[c_uu, c_uv, _], [_, c_vv, _], [_, _, c_ss]] = of_triangles[triangle];

@@ -24,7 +24,7 @@ mod split;
 mod symmetric;
 mod term;
 
-pub(super) use split::plain_moduli;
+pub(super) use split::{moduli_at_rest, plain_moduli, tensile_stiffness};
 pub(super) use term::{NodalMembrane, RestShapes};
 #[cfg(test)]
 mod tests;

@@ -8,23 +8,30 @@ use super::term::{Moduli, RestShapes};
 use crate::fabric::locking::Folds;
 use crate::mesh::MaterialTriangle;
 
+/// Returns the moduli of a membrane at rest.
+pub(in super::super) fn moduli_at_rest<E: PackedPotential<f64> + std::fmt::Debug + Send + Sync + 'static>(
+    element: &dyn Fn(MaterialTriangle) -> Result<E, RestError>,
+) -> Result<Moduli, RestError> {
+    Ok(TriangleLaw::new(&[1.0], element)?.respond(&[[0.0; 3]], Order::Hessian).0[0].moduli)
+}
+
+/// Returns the tensile stiffness of a narrow strip along the stiffer of warp and weft.
+pub(in super::super) fn tensile_stiffness(&[[uu, uv, _], [_, vv, _], _]: &Moduli) -> f64 {
+    let narrow = |along: f64, across: f64| if across > 0.0 { along - uv * uv / across } else { along };
+    narrow(uu, vv).max(narrow(vv, uu))
+}
+
 /// Returns C_v of each fan: the moduli at rest, with eigenvalues cut to what plain triangles carry without locking.
 /// `None` if nothing was cut, so that plain triangles serve as well.
-pub(in super::super) fn plain_moduli<E: PackedPotential<f64> + std::fmt::Debug + Send + Sync + 'static>(
-    shapes: &RestShapes<'_>,
-    folds: Folds,
-    element: &dyn Fn(MaterialTriangle) -> Result<E, RestError>,
-) -> Result<Option<Vec<Moduli>>, RestError> {
-    let law = TriangleLaw::new(&[1.0], element)?;
-    let moduli = law.respond(&[[0.0; 3]], Order::Hessian).0[0].moduli;
+pub(in super::super) fn plain_moduli(shapes: &RestShapes<'_>, folds: &Folds, moduli: &Moduli) -> Option<Vec<Moduli>> {
     let mut is_cut = false;
-    let cut = |edge: f64| {
-        let (cut, changed) = cut(&moduli, folds.plain_stiffness(edge));
+    let cut = |edge: &f64| {
+        let (cut, changed) = cut(moduli, folds.plain_stiffness(*edge));
         is_cut |= changed;
         cut
     };
-    let plain: Vec<Moduli> = shapes.edge_lengths().into_iter().map(cut).collect();
-    Ok(is_cut.then_some(plain))
+    let plain: Vec<Moduli> = shapes.edge_lengths().iter().map(cut).collect();
+    is_cut.then_some(plain)
 }
 
 /// Cuts the eigenvalues of moduli to at most `largest`, in N/m, and drops negative ones. Returns whether any was cut.
