@@ -171,7 +171,7 @@ impl Strip {
 }
 
 /// Returns the points with small random displacements, so that no four lie on a circle.
-fn perturbed(points: &[Point], by: f64) -> Vec<Point> {
+pub(super) fn perturbed(points: &[Point], by: f64) -> Vec<Point> {
     let mut random = random_numbers(99);
     points.iter().map(|&[x, y]| [x + by * random(), y + by * random()]).collect()
 }

@@ -7,6 +7,7 @@ mod error;
 mod hair;
 mod library;
 mod locking;
+mod membrane;
 mod nodal;
 mod patch_blocks;
 mod plasticity;

@@ -9,15 +9,13 @@ use energy_solve::{DissipationTerm, DrivenTerm, ElementList, ForceTerm, ListErro
 use super::damping::{HingeDamping, MembraneDamping};
 use super::declared::{Declared, TargetMesh};
 use super::error::FabricError;
-use super::locking::{Folds, Locking};
-use super::nodal::{self, NodalMembrane, RestShapes};
-use super::plasticity::{PlasticHinges, PlasticMembrane, angle_of_curvature};
-use super::plate::{PlateTerm, Rigidity, ThreadError};
-use super::{Bending, Fabric, Hysteresis, MassSpring, Material, Plasticity, Rayleigh, Strain, StrainLimit};
+use super::locking::Locking;
+use super::membrane::MaterialMesh;
+use super::plasticity::{PlasticHinges, angle_of_curvature};
+use super::plate::{PlateTerm, Rigidity};
+use super::{Bending, Fabric, Hysteresis, MassSpring, Material, Plasticity, Rayleigh, StrainLimit};
 use crate::geometry::{cross, norm, subtract};
-use crate::mesh::{
-    Hinge, MaterialTriangle, SpringNetwork, Topology, TriangleMesh, Warp, lumped_masses, material_triangle, rest_angle,
-};
+use crate::mesh::{Hinge, MaterialTriangle, SpringNetwork, Topology, TriangleMesh, lumped_masses, rest_angle};
 
 /// External forces on every cloth.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -50,7 +48,7 @@ pub struct FabricTerms {
     pub warnings: Vec<String>,
     /// An estimate of locking; `None` without a membrane or bending resistance, and for springs and declared elements.
     pub locking: Option<Locking>,
-    part: SystemPart,
+    pub(super) part: SystemPart,
 }
 
 /// Creates the terms of a fabric on a mesh. Only mass–spring fabrics use `springs`.
@@ -79,11 +77,7 @@ pub fn terms_at(
 ) -> Result<FabricTerms, FabricError> {
     let masses = lumped_masses(mesh, fabric.density);
     let mut terms = FabricTerms::new(masses, part);
-    let plasticity = fabric.plasticity.unwrap_or_default();
-    let (triangles, is_woven) = material_triangles(mesh, fabric)?;
-    let folds = folds(fabric, surroundings)?;
-    let (warp, strain) = (fabric.warp, fabric.strain);
-    let cloth = MaterialMesh { mesh, triangles, is_woven, warp, plasticity, strain, folds };
+    let cloth = MaterialMesh::new(mesh, fabric, surroundings)?;
     check_plasticity(fabric)?;
     // λ and μ for small strains; damping is proportional to them.
     let stiffness = match &fabric.material {
@@ -155,33 +149,6 @@ pub fn terms_at(
     Ok(terms)
 }
 
-/// A mesh with its triangles in material coordinates.
-struct MaterialMesh<'a> {
-    mesh: &'a TriangleMesh,
-    triangles: Vec<MaterialTriangle>,
-    /// Whether the first axis of each triangle is its warp.
-    is_woven: bool,
-    warp: Warp,
-    plasticity: Plasticity,
-    strain: Strain,
-    /// The folds that the membrane should not lock.
-    folds: Folds,
-}
-
-/// Returns the folds that the membrane should not lock.
-fn folds(fabric: &Fabric, surroundings: &Surroundings) -> Result<Folds, FabricError> {
-    let rigidity = match fabric.material.bending() {
-        Some(Bending::Plate(plate)) => {
-            let [[along_warp, ..], [_, along_weft, _], _] = plate.matrix()?;
-            along_warp.min(along_weft)
-        }
-        bending => rigidity_along_grid(bending.unwrap_or(&Bending::None))?,
-    };
-    // Folds without gravity are judged as if there were some.
-    let gravity = Some(norm(surroundings.gravity)).filter(|&gravity| gravity > 0.0).unwrap_or(9.81);
-    Ok(Folds { rigidity, weight: gravity * fabric.density })
-}
-
 /// Returns an error if something would have to yield that cannot.
 fn check_plasticity(fabric: &Fabric) -> Result<(), FabricError> {
     let Some(Plasticity { stretch, curvature }) = fabric.plasticity else { return Ok(()) };
@@ -190,23 +157,6 @@ fn check_plasticity(fabric: &Fabric) -> Result<(), FabricError> {
     }
     let can_fold = matches!(fabric.material.bending(), Some(Bending::Plate(_) | Bending::Bridson { .. }));
     if curvature.is_some() && !can_fold { Err(FabricError::CannotFold) } else { Ok(()) }
-}
-
-/// Maps every triangle to its plane; with the first axis along the warp if the fabric depends on it. Returns whether it
-/// does.
-fn material_triangles(mesh: &TriangleMesh, fabric: &Fabric) -> Result<(Vec<MaterialTriangle>, bool), ThreadError> {
-    let woven = matches!(
-        fabric.material,
-        Material::BaraffWitkin(_) | Material::OrthotropicStvk(_) | Material::Yarns(_) | Material::File(_)
-    );
-    let all = 0..mesh.triangles().len();
-    if !woven && fabric.strain_limit.is_none() {
-        return Ok((all.map(|triangle| material_triangle(mesh.corners(triangle))).collect(), false));
-    }
-    let warp = fabric.warp;
-    let triangles: Result<_, _> =
-        all.map(|triangle| mesh.thread_triangle(triangle, warp).ok_or(ThreadError { triangle, warp })).collect();
-    triangles.map(|triangles| (triangles, true))
 }
 
 pub(super) fn area([a, b, c]: MaterialTriangle) -> f64 {
@@ -275,65 +225,7 @@ impl FabricTerms {
         Ok(())
     }
 
-    /// Adds triangles, or nodal averages beside triangles as stiff as they can be without locking.
-    fn add_membrane<E>(
-        &mut self,
-        name: &str,
-        is_zero: bool,
-        cloth: &MaterialMesh<'_>,
-        element: impl Fn(MaterialTriangle) -> Result<E, RestError> + Send + Sync + 'static,
-    ) -> Result<(), FabricError>
-    where
-        E: PackedPotential<f64> + std::fmt::Debug + Send + Sync + 'static,
-    {
-        if self.leave_out(name, is_zero, cloth.triangles.len()) {
-            return Ok(());
-        }
-        let at_rest = |source| FabricError::Rest { triangle: 0, source };
-        let moduli = nodal::moduli_at_rest(&element).map_err(at_rest)?;
-        let shapes = RestShapes::new(cloth.mesh, &cloth.triangles, cloth.is_woven);
-        let plain = match cloth.strain {
-            Strain::Nodal => nodal::plain_moduli(&shapes, &cloth.folds, &moduli),
-            Strain::PerTriangle => None,
-        };
-        let edges = shapes.edge_lengths();
-        let edge = edges.iter().sum::<f64>() / edges.len() as f64;
-        let locking = Locking::new(&cloth.folds, nodal::tensile_stiffness(&moduli), edge, plain.is_some());
-        if self.locking.is_none_or(|known| known.stiffness < locking.stiffness) && locking.wasted.is_normal() {
-            self.locking = Some(locking);
-        }
-        let Some(plain) = plain else { return self.add_triangles(name, cloth, move |_, rest| element(rest)) };
-        let of_triangles = shapes.means_of_corners(&plain);
-        self.add_triangles(name, cloth, move |triangle, [u0, u1, u2]| {
-            let [[c_uu, c_uv, _], [_, c_vv, _], [_, _, c_ss]] = of_triangles[triangle];
-            OrthotropicStVK::new(u0, u1, u2, c_uu - c_uv, c_vv - c_uv, c_uv, c_ss)
-        })?;
-        let (name, limit) = (self.named(&format!("nodal {name}")), cloth.plasticity.stretch);
-        let term = NodalMembrane::new(name, self.part.first, shapes, plain, element, limit).map_err(at_rest)?;
-        self.terms.push(Box::new(term));
-        Ok(())
-    }
-
-    /// Adds an element for each triangle.
-    fn add_triangles<E>(
-        &mut self,
-        name: &str,
-        cloth: &MaterialMesh<'_>,
-        element: impl Fn(usize, MaterialTriangle) -> Result<E, RestError> + Send + Sync + 'static,
-    ) -> Result<(), FabricError>
-    where
-        E: PackedPotential<f64> + std::fmt::Debug + Send + Sync + 'static,
-    {
-        let elements = elements(cloth, &element)?;
-        let Some(limit) = cloth.plasticity.stretch else {
-            return self.add_potential(name, cloth.mesh.triangles(), elements);
-        };
-        let law = PlasticMembrane::new(cloth.triangles.clone(), elements, Box::new(element), limit);
-        self.add_driven(name, cloth.mesh.triangles(), law);
-        Ok(())
-    }
-
-    fn add_driven<L: energy_solve::DrivenLaw + 'static, const N: usize>(
+    pub(super) fn add_driven<L: energy_solve::DrivenLaw + 'static, const N: usize>(
         &mut self,
         name: &str,
         stencils: &[[usize; N]],
@@ -344,27 +236,13 @@ impl FabricTerms {
     }
 
     /// Prefixes the name of a term.
-    fn named(&self, name: &str) -> String {
+    pub(super) fn named(&self, name: &str) -> String {
         format!("{}{name}", self.part.prefix)
     }
 
     /// Numbers vertices as in the system.
     fn in_system<const N: usize>(&self, stencils: &[[usize; N]]) -> Vec<[usize; N]> {
         stencils.iter().map(|stencil| stencil.map(|vertex| self.part.first + vertex)).collect()
-    }
-
-    /// Adds a membrane and returns its λ and μ.
-    fn add_isotropic<E>(
-        &mut self,
-        cloth: &MaterialMesh<'_>,
-        (lambda, mu): (f64, f64),
-        element: impl Fn([f64; 2], [f64; 2], [f64; 2], f64, f64) -> Result<E, RestError> + Send + Sync + 'static,
-    ) -> Result<(f64, f64), FabricError>
-    where
-        E: PackedPotential<f64> + std::fmt::Debug + Send + Sync + 'static,
-    {
-        self.add_membrane("membrane", mu == 0.0, cloth, move |[u0, u1, u2]| element(u0, u1, u2, lambda, mu))?;
-        Ok((lambda, mu))
     }
 
     fn add_declared(&mut self, declared: &Declared, cloth: &MaterialMesh<'_>, density: f64) -> Result<(), FabricError> {
@@ -548,24 +426,13 @@ impl FabricTerms {
 }
 
 /// Returns the flexural rigidity along the warp, in N m. For hinges, that of a sheet with regular diagonals.
-fn rigidity_along_grid(bending: &Bending) -> Result<f64, FabricError> {
+pub(super) fn rigidity_along_grid(bending: &Bending) -> Result<f64, FabricError> {
     Ok(match bending {
         Bending::None => 0.0,
         Bending::Plate(rigidity) => rigidity.matrix()?[0][0],
         Bending::Bridson { stiffness } | Bending::BridsonForce { stiffness, .. } => 0.25 * stiffness,
         Bending::Flat { stiffness } => 1.5 * stiffness,
     })
-}
-
-/// Creates an element for each triangle.
-fn elements<E>(
-    cloth: &MaterialMesh<'_>,
-    element: impl Fn(usize, MaterialTriangle) -> Result<E, RestError>,
-) -> Result<Vec<E>, FabricError> {
-    let one = |(triangle, material_triangles): (usize, &MaterialTriangle)| {
-        element(triangle, *material_triangles).map_err(|source| FabricError::Rest { triangle, source })
-    };
-    cloth.triangles.iter().enumerate().map(one).collect()
 }
 
 /// Returns ‖Ē‖²/(‖N̄₁‖ + ‖N̄₂‖) of a hinge at rest.

@@ -111,3 +111,53 @@ fn derivatives_are_those_of_the_energy() {
         }
     }
 }
+
+/// A quarter of a tube, whose triangles start at any of their corners.
+fn tube(cells: usize, first_corner: impl Fn(usize) -> usize) -> TriangleMesh {
+    let flat = irregular(cells, 3);
+    let roll = |&[x, y, _]: &Vector3<f64>| [x.sin(), y, 1.0 - x.cos()];
+    let turned = |(number, &[a, b, c]): (usize, &[usize; 3])| [[a, b, c], [b, c, a], [c, a, b]][first_corner(number)];
+    let triangles = flat.triangles().iter().enumerate().map(turned).collect();
+    TriangleMesh::new(flat.vertices().iter().map(roll).collect(), triangles).unwrap()
+}
+
+#[test]
+fn isotropic_membranes_have_no_preferred_corner() {
+    let meshes = [tube(5, |_| 0), tube(5, |triangle| triangle * 7 % 3)];
+    let x = deformed(&meshes[0], 0.05, 5);
+    for material in materials().into_iter().take(5) {
+        let [first, second] =
+            [0, 1].map(|mesh| energy(&mut system(&meshes[mesh], material.clone(), Strain::Nodal), &x));
+        assert!((first / second - 1.0).abs() < 1e-12, "{material:?}: {first} and {second}");
+    }
+    // The rest shape is at rest.
+    let mut stvk = system(&meshes[1], materials().remove(0), Strain::Nodal);
+    assert!(energy(&mut stvk, meshes[1].vertices()).abs() < 1e-20);
+}
+
+#[test]
+fn clamped_hessians_have_no_negative_curvature() {
+    let mesh = irregular(4, 4);
+    // Compressed by a third, and bent.
+    let crushed: Vec<Vector3<f64>> = deformed(&mesh, 0.1, 1).iter().map(|x| x.map(|c| 0.66 * c)).collect();
+    for material in materials() {
+        let mut system = system(&mesh, material.clone(), Strain::Nodal);
+        let [exact, clamped] = [Curvature::Exact, Curvature::Clamped].map(|curvature| {
+            let (_, matrix) = linearised(&mut system, &crushed, curvature);
+            let mut random = fastrand::Rng::with_seed(3);
+            let mut least = f64::INFINITY;
+            for _ in 0..200 {
+                let direction: Vec<Vector3<f64>> = crushed
+                    .iter()
+                    .map(|_| [random.f64() - 0.5, random.f64() - 0.5, 4.0 * (random.f64() - 0.5)])
+                    .collect();
+                let mut product = vec![[0.0; 3]; direction.len()];
+                matrix.multiply(&direction, &mut product);
+                let bend: f64 = product.as_flattened().iter().zip(direction.as_flattened()).map(|(p, d)| p * d).sum();
+                least = least.min(bend);
+            }
+            least
+        });
+        assert!(clamped >= 0.0 && exact < clamped, "{material:?}: {exact} and {clamped}");
+    }
+}
