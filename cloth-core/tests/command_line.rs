@@ -84,7 +84,7 @@ fn the_demonstration_audits_simulates_and_repeats() {
         let output = cloth(&["demo"], folder.path());
         let text = String::from_utf8(output.stdout).unwrap();
         assert!(output.status.success(), "{text}{}", String::from_utf8_lossy(&output.stderr));
-        assert!(text.starts_with("audit of 4 elements") && text.contains("150 steps"), "{text}");
+        assert!(text.starts_with("audit of 5 elements") && text.contains("150 steps"), "{text}");
     }
     // 1.5 s at 25 frames per second, and the initial frame.
     assert_eq!(std::fs::read_dir(folder.path().join("out/frames")).unwrap().count(), 38);

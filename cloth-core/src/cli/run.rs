@@ -114,7 +114,7 @@ fn dry_run(text: &str, path: &Path, threads: Option<u16>, log: LogChoice) -> Res
                 "edge": locking.edge,
                 "stiffness": locking.stiffness,
                 "wasted": locking.wasted,
-                "is_avoided": locking.is_avoided,
+                "is_nodal": locking.is_nodal,
                 "sufficient_edge": locking.sufficient_edge,
                 "sufficient_stiffness": locking.sufficient_stiffness,
             })

@@ -12,6 +12,8 @@
 
 use std::fmt;
 
+use super::Strain;
+
 /// The wasted share, times D/(K κ² h⁴).
 const WASTE: f64 = 7.5e-5;
 /// The share that plain triangles may waste beside nodal averages, which carry the rest of the stiffness.
@@ -60,8 +62,8 @@ pub struct Locking {
     pub stiffness: f64,
     /// Λ: the energy that plain triangles of this stiffness would waste, as a share of the bending energy of a fold.
     pub wasted: f64,
-    /// Whether nodal averages carry the part of the stiffness that would lock.
-    pub is_avoided: bool,
+    /// Whether the membrane takes nodal averages of the strain, as far as its weight allows.
+    pub is_nodal: bool,
     /// The edge length whose plain triangles waste no more than 5 %, in m.
     pub sufficient_edge: f64,
     /// The stiffness whose plain triangles waste no more than 5 % on this mesh, in N/m.
@@ -69,14 +71,14 @@ pub struct Locking {
 }
 
 impl Locking {
-    pub(super) fn new(folds: &Folds, stiffness: f64, edge: f64, is_avoided: bool) -> Self {
+    pub(super) fn new(folds: &Folds, stiffness: f64, edge: f64, strain: Strain) -> Self {
         let wasted = folds.wasted(stiffness, edge);
         let bending_length = (folds.rigidity / folds.weight).cbrt();
         Self {
             edge,
             stiffness,
             wasted,
-            is_avoided: is_avoided && wasted > LARGEST_SHARE,
+            is_nodal: strain == Strain::Nodal,
             sufficient_edge: (LARGEST_SHARE * folds.rigidity * bending_length.powi(2) / (WASTE * stiffness)).powf(0.25),
             sufficient_stiffness: LARGEST_SHARE * stiffness / wasted,
         }
@@ -85,7 +87,7 @@ impl Locking {
     /// Whether the cloth bends too stiffly on its mesh: triangles waste more than 5 %, and nothing avoids it.
     #[must_use]
     pub fn locks(&self) -> bool {
-        self.wasted > LARGEST_SHARE && !self.is_avoided
+        self.wasted > LARGEST_SHARE && !self.is_nodal
     }
 
     /// Returns the estimated error of a drape coefficient with plain triangles, in points of a hundred.
@@ -109,11 +111,11 @@ impl fmt::Display for Locking {
             "membrane locking: on a mesh with edges of {edge:.1} mm, triangles of {stiffness:.0} N/m would waste \
              {share:.0} % of the bending energy of a fold"
         )?;
-        if self.is_avoided {
-            return f.write_str("; nodal averages of the strain avoid it");
-        }
-        if !self.locks() {
+        if *wasted <= LARGEST_SHARE {
             return f.write_str(", which is little");
+        }
+        if self.is_nodal {
+            return f.write_str("; nodal averages of the strain avoid it");
         }
         let effect = if *wasted > 0.5 { "its folds are frozen" } else { "it bends too stiffly" };
         write!(
@@ -134,14 +136,14 @@ mod tests {
 
     #[test]
     fn the_sufficient_edge_and_stiffness_waste_five_percent() {
-        let locking = Locking::new(&FOLDS, 2e4, 7.5e-3, false);
+        let locking = Locking::new(&FOLDS, 2e4, 7.5e-3, Strain::PerTriangle);
         assert!(locking.locks() && locking.wasted > 1.0 && locking.to_string().contains("frozen"), "{locking}");
         for (stiffness, edge) in [(2e4, locking.sufficient_edge), (locking.sufficient_stiffness, 7.5e-3)] {
             let wasted = FOLDS.wasted(stiffness, edge);
             assert!((wasted / LARGEST_SHARE - 1.0).abs() < 1e-12, "{wasted}");
-            assert!(!Locking::new(&FOLDS, 0.999 * stiffness, edge, false).locks());
+            assert!(!Locking::new(&FOLDS, 0.999 * stiffness, edge, Strain::PerTriangle).locks());
         }
-        assert!(!Locking::new(&FOLDS, 2e4, 7.5e-3, true).locks());
+        assert!(!Locking::new(&FOLDS, 2e4, 7.5e-3, Strain::Nodal).locks());
     }
 
     #[test]

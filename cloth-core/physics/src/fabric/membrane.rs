@@ -96,7 +96,7 @@ impl FabricTerms {
         };
         let edges = shapes.edge_lengths();
         let edge = edges.iter().sum::<f64>() / edges.len() as f64;
-        let locking = Locking::new(&cloth.folds, nodal::tensile_stiffness(&moduli), edge, plain.is_some());
+        let locking = Locking::new(&cloth.folds, nodal::tensile_stiffness(&moduli), edge, cloth.strain);
         if self.locking.is_none_or(|known| known.stiffness < locking.stiffness) && locking.wasted.is_normal() {
             self.locking = Some(locking);
         }
