@@ -1,6 +1,8 @@
 //! Output files: frames (OBJ, PLY, PNG), animations (glTF, USD), pictures.
 
 mod animation;
+mod crease;
+mod floor;
 mod floor_shadow;
 mod folder;
 mod picture;
@@ -9,9 +11,12 @@ mod point_cache;
 mod projection;
 mod raster;
 mod scenery;
+mod shade;
 mod show;
+mod smooth_surface;
 mod solid_mesh;
 mod style;
+mod surfaces;
 mod track;
 mod usd;
 mod visibility;

@@ -1,11 +1,11 @@
-//! A rasteriser with a depth buffer.
+//! Triangles as pixels, and a picture with a depth buffer.
 
 use tiny_skia::Pixmap;
 
 /// A picture with a depth buffer.
 pub(super) struct Canvas {
     pub pixels: Pixmap,
-    /// 1/depth in 1/m; 0 for the background.
+    /// 1/depth in 1/m; 0 for transparent pixels.
     nearness: Vec<f32>,
 }
 
@@ -18,6 +18,7 @@ pub(super) struct Corner {
 }
 
 impl Canvas {
+    /// Starts with these transparent pixels.
     pub fn new(pixels: Pixmap) -> Self {
         let nearness = vec![0.0; pixels.width() as usize * pixels.height() as usize];
         Self { pixels, nearness }
@@ -25,49 +26,27 @@ impl Canvas {
 
     /// Fills a triangle; interpolates colour and 1/depth linearly.
     pub fn triangle(&mut self, corners: [Corner; 3]) {
-        let [a, b, c] = corners.map(|corner| corner.place);
-        let area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
-        if !area.is_normal() || corners.iter().any(|corner| corner.depth <= 0.0) {
+        if corners.iter().any(|corner| corner.depth <= 0.0) {
             return;
         }
-        let range = |axis: usize, size: u32| {
-            let places = [a[axis], b[axis], c[axis]];
-            let low = places.into_iter().fold(f64::INFINITY, f64::min);
-            let high = places.into_iter().fold(f64::NEG_INFINITY, f64::max);
-            ((low - 0.5).ceil().max(0.0) as usize, ((high + 0.5).ceil().max(0.0) as usize).min(size as usize))
-        };
-        let (columns, rows) = (range(0, self.pixels.width()), range(1, self.pixels.height()));
-        let width = self.pixels.width() as usize;
-        // The barycentric weight opposite the edge p → q, and its change per column.
-        let weight = |p: [f64; 2], q: [f64; 2], at: [f64; 2]| {
-            ((q[0] - p[0]) * (at[1] - p[1]) - (q[1] - p[1]) * (at[0] - p[0])) / area
-        };
-        let steps = [(b, c), (c, a), (a, b)].map(|(p, q)| (p[1] - q[1]) / area);
         let near = corners.map(|corner| 1.0 / corner.depth);
-        let data = self.pixels.data_mut();
-        for row in rows.0..rows.1 {
-            let first = [columns.0 as f64 + 0.5, row as f64 + 0.5];
-            let starts = [weight(b, c, first), weight(c, a, first), weight(a, b, first)];
-            for column in columns.0..columns.1 {
-                let offset = (column - columns.0) as f64;
-                let parts: [f64; 3] = std::array::from_fn(|i| starts[i] + offset * steps[i]);
-                // A tiny overlap: rounding leaves no gap between neighbours.
-                if parts.iter().any(|part| *part < -1e-9) {
-                    continue;
-                }
-                let nearness: f64 = parts.iter().zip(near).map(|(part, near)| part * near).sum();
-                let place = row * width + column;
-                if nearness as f32 <= self.nearness[place] {
-                    continue;
-                }
-                self.nearness[place] = nearness as f32;
-                for channel in 0..3 {
-                    let shade: f64 = (0..3).map(|i| parts[i] * f64::from(corners[i].colour[channel])).sum();
-                    data[4 * place + channel] = (255.0 * shade).round().clamp(0.0, 255.0) as u8;
-                }
-                data[4 * place + 3] = 255;
+        let colours = corners.map(|corner| corner.colour.map(|channel| 255.0 * channel));
+        let size = [self.pixels.width(), self.pixels.height()].map(|side| side as usize);
+        let (data, nearest) = (self.pixels.data_mut(), &mut self.nearness);
+        for_each_pixel(corners.map(|corner| corner.place), size, |place, parts| {
+            let nearness = (parts[0] * near[0] + parts[1] * near[1] + parts[2] * near[2]) as f32;
+            if nearness <= nearest[place] {
+                return;
             }
-        }
+            nearest[place] = nearness;
+            let parts = parts.map(|part| part as f32);
+            let pixel = &mut data[4 * place..4 * place + 4];
+            for channel in 0..3 {
+                let shade: f32 = (0..3).map(|corner| parts[corner] * colours[corner][channel]).sum();
+                pixel[channel] = (shade + 0.5) as u8;
+            }
+            pixel[3] = 255;
+        });
     }
 
     /// Draws a line with this width, in pixels.
@@ -84,5 +63,42 @@ impl Canvas {
         };
         self.triangle([moved(from, 1.0), moved(from, -1.0), moved(to, 1.0)]);
         self.triangle([moved(from, -1.0), moved(to, -1.0), moved(to, 1.0)]);
+    }
+}
+
+/// Calls a function with each pixel whose centre lies in a triangle, and the barycentric weights of the corners.
+/// Pixels are numbered row by row.
+pub(super) fn for_each_pixel(
+    [a, b, c]: [[f64; 2]; 3],
+    size: [usize; 2],
+    mut visit: impl FnMut(usize, [f64; 3]),
+) {
+    let area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
+    if !area.is_normal() {
+        return;
+    }
+    let range = |axis: usize| {
+        let (low, high) = (a[axis].min(b[axis]).min(c[axis]), a[axis].max(b[axis]).max(c[axis]));
+        ((low - 0.5).max(0.0) as usize, ((high + 0.5).max(0.0) as usize).min(size[axis]))
+    };
+    let (columns, rows) = (range(0), range(1));
+    let part = 1.0 / area;
+    // The weights of the second and third corner, and their changes per column.
+    let steps = [(c[1] - a[1]) * part, (a[1] - b[1]) * part];
+    for row in rows.0..rows.1 {
+        let [x, y] = [columns.0 as f64 + 0.5 - a[0], row as f64 + 0.5 - a[1]];
+        let starts = [
+            (x * (c[1] - a[1]) - y * (c[0] - a[0])) * part,
+            (y * (b[0] - a[0]) - x * (b[1] - a[1])) * part,
+        ];
+        for column in columns.0..columns.1 {
+            let offset = (column - columns.0) as f64;
+            let [second, third] = [starts[0] + offset * steps[0], starts[1] + offset * steps[1]];
+            let first = 1.0 - second - third;
+            // A tiny overlap: rounding leaves no gap between neighbours.
+            if first.min(second).min(third) >= -1e-9 {
+                visit(row * size[0] + column, [first, second, third]);
+            }
+        }
     }
 }

@@ -1,0 +1,187 @@
+//! Sharp edges of a mesh, the curves that they form, and the normals of the smooth parts between them.
+
+use energy_dsl::Vector3;
+
+use crate::geometry::{add_scaled, cross, dot, norm, subtract};
+
+/// A polyline of sharp edges that turns by more than this has a corner: cosine of 70°.
+const CORNER: f64 = 0.342;
+
+/// An edge of a triangle: its vertices in ascending order, and the triangle with the index of the edge's first corner.
+type Side = ([usize; 2], usize, usize);
+
+/// A mesh whose vertices are split along its sharp edges: each smooth part has vertices of its own.
+pub(super) struct Creased {
+    /// The original vertex of each vertex.
+    pub originals: Vec<usize>,
+    pub triangles: Vec<[usize; 3]>,
+    pub normals: Vec<Vector3<f64>>,
+    /// For each triangle and each edge, which starts at the corner of that index.
+    pub edges: Vec<[Edge; 3]>,
+    /// Unit tangent of the curve of sharp edges at each original vertex; zero where there is none, or a corner.
+    pub tangents: Vec<Vector3<f64>>,
+}
+
+/// Kinds of edges.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Edge {
+    Smooth,
+    /// Between triangles at an angle, or between more than two.
+    Sharp,
+    /// An edge of one triangle.
+    Border,
+}
+
+impl Creased {
+    /// Splits a mesh at borders, at edges of more than two triangles, and where the normals of two triangles have a
+    /// cosine below `crease`.
+    pub(super) fn of(points: &[Vector3<f64>], triangles: &[[usize; 3]], crease: f64) -> Self {
+        let unit = |corners: &[usize; 3]| {
+            let [a, b, c] = corners.map(|corner| points[corner]);
+            unit_or_zero(cross(subtract(b, a), subtract(c, a)))
+        };
+        let faces: Vec<Vector3<f64>> = triangles.iter().map(unit).collect();
+        let sides = sorted_sides(triangles);
+        let mut edges = vec![[Edge::Border; 3]; triangles.len()];
+        let mut fans = Fans::new(3 * triangles.len());
+        let mut sharp: Vec<[usize; 2]> = Vec::new();
+        for group in sides.chunk_by(|a, b| a.0 == b.0) {
+            let kind = kind_of(group, triangles, &faces, crease);
+            for (_, triangle, corner) in group {
+                edges[*triangle][*corner] = kind;
+            }
+            if kind == Edge::Smooth {
+                let [(ends, a, _), (_, b, _)] = [group[0], group[1]];
+                ends.iter().for_each(|&end| fans.join(corner_of(triangles, a, end), corner_of(triangles, b, end)));
+            } else {
+                sharp.push(group[0].0);
+            }
+        }
+        let (originals, split) = fans.numbered(triangles);
+        let normals = normals(points, triangles, &split, originals.len());
+        Self { originals, triangles: split, normals, edges, tangents: tangents(points, &sharp) }
+    }
+}
+
+fn sorted_sides(triangles: &[[usize; 3]]) -> Vec<Side> {
+    let side = |(triangle, corners): (usize, &[usize; 3])| {
+        let corners = *corners;
+        (0..3).map(move |from| {
+            let (a, b) = (corners[from], corners[(from + 1) % 3]);
+            ([a.min(b), a.max(b)], triangle, from)
+        })
+    };
+    let mut sides: Vec<Side> = triangles.iter().enumerate().flat_map(side).collect();
+    sides.sort_unstable();
+    sides
+}
+
+/// Returns the kind of the edge that these sides share. Triangles that see it in the same direction have opposite
+/// fronts.
+fn kind_of(group: &[Side], triangles: &[[usize; 3]], faces: &[Vector3<f64>], crease: f64) -> Edge {
+    match group {
+        [_] => Edge::Border,
+        [(_, a, at_a), (_, b, at_b)] if triangles[*a][*at_a] != triangles[*b][*at_b] => {
+            if dot(faces[*a], faces[*b]) >= crease { Edge::Smooth } else { Edge::Sharp }
+        }
+        _ => Edge::Sharp,
+    }
+}
+
+/// Returns the number of a triangle's corner at a vertex.
+fn corner_of(triangles: &[[usize; 3]], triangle: usize, vertex: usize) -> usize {
+    3 * triangle + triangles[triangle].iter().position(|corner| *corner == vertex).unwrap_or(0)
+}
+
+/// Corners of triangles that share a vertex of a smooth part: disjoint sets.
+struct Fans(Vec<usize>);
+
+impl Fans {
+    fn new(corners: usize) -> Self {
+        Self((0..corners).collect())
+    }
+
+    fn first(&mut self, mut corner: usize) -> usize {
+        while self.0[corner] != corner {
+            // Path halving.
+            self.0[corner] = self.0[self.0[corner]];
+            corner = self.0[corner];
+        }
+        corner
+    }
+
+    fn join(&mut self, a: usize, b: usize) {
+        let (a, b) = (self.first(a), self.first(b));
+        self.0[a.max(b)] = a.min(b);
+    }
+
+    /// Numbers the sets. Returns the original vertex of each, and the triangles in the new numbers.
+    fn numbered(mut self, triangles: &[[usize; 3]]) -> (Vec<usize>, Vec<[usize; 3]>) {
+        let (mut originals, mut numbers) = (Vec::new(), vec![0; self.0.len()]);
+        let mut split = triangles.to_vec();
+        for (corner, vertex) in split.as_flattened_mut().iter_mut().enumerate() {
+            // The first corner of a set precedes the others.
+            let first = self.first(corner);
+            if first == corner {
+                numbers[corner] = originals.len();
+                originals.push(*vertex);
+            }
+            *vertex = numbers[first];
+        }
+        (originals, split)
+    }
+}
+
+/// Returns unit normals with the weights of Max (1999), which are exact on spheres: n = Σ a × b/(‖a‖² ‖b‖²) over the
+/// triangles with edges a and b at the vertex.
+fn normals(points: &[Vector3<f64>], originals: &[[usize; 3]], split: &[[usize; 3]], count: usize) -> Vec<Vector3<f64>> {
+    let mut sums = vec![[0.0; 3]; count];
+    for (corners, numbers) in originals.iter().zip(split) {
+        let places = corners.map(|corner| points[corner]);
+        for corner in 0..3 {
+            let [a, b] = [1, 2].map(|step| subtract(places[(corner + step) % 3], places[corner]));
+            let weight = 1.0 / (dot(a, a) * dot(b, b));
+            let sum = add_scaled(sums[numbers[corner]], weight, cross(a, b));
+            if sum.iter().all(|component| component.is_finite()) {
+                sums[numbers[corner]] = sum;
+            }
+        }
+    }
+    // The normals of folded triangles may cancel; any unit vector is good enough for shading.
+    sums.into_iter().map(|sum| if sum == [0.0; 3] { [0.0, 0.0, 1.0] } else { unit_or_zero(sum) }).collect()
+}
+
+/// Returns the tangents at vertices where two sharp edges meet. With edges a and b on either side, the direction
+/// a ‖b‖/‖a‖ + b ‖a‖/‖b‖ is exact on circles.
+fn tangents(points: &[Vector3<f64>], sharp: &[[usize; 2]]) -> Vec<Vector3<f64>> {
+    let mut neighbours = vec![([usize::MAX; 2], 0_u8); points.len()];
+    for &[a, b] in sharp {
+        for (vertex, other) in [(a, b), (b, a)] {
+            let (both, count) = &mut neighbours[vertex];
+            if let Some(place) = both.get_mut(usize::from(*count)) {
+                *place = other;
+            }
+            *count = count.saturating_add(1);
+        }
+    }
+    let tangent = |(point, &([from, to], count)): (&Vector3<f64>, &([usize; 2], u8))| {
+        if count != 2 {
+            return [0.0; 3];
+        }
+        let (a, b) = (subtract(*point, points[from]), subtract(points[to], *point));
+        let [long, short] = [norm(a), norm(b)];
+        if dot(a, b) > CORNER * long * short {
+            let sum = add_scaled(a.map(|component| component * short / long), long / short, b);
+            unit_or_zero(sum)
+        } else {
+            [0.0; 3]
+        }
+    };
+    points.iter().zip(&neighbours).map(tangent).collect()
+}
+
+/// Returns the unit vector of a direction, or zero if it has none.
+pub(super) fn unit_or_zero(direction: Vector3<f64>) -> Vector3<f64> {
+    let length = norm(direction);
+    if length > 0.0 && length.is_finite() { direction.map(|component| component / length) } else { [0.0; 3] }
+}

@@ -1,0 +1,57 @@
+//! The floor of a picture: a tone with thin lines, which fades into the background with the distance.
+
+use tiny_skia::Pixmap;
+
+use super::projection::Camera;
+use super::style::OVERSAMPLING;
+
+/// Brightness of the floor relative to the background, and of its lines relative to the floor.
+const TONE: f32 = 0.955;
+const LINE: f32 = 0.93;
+/// Width of a line relative to the distance of lines.
+const WIDTH: f64 = 0.012;
+/// Lines in the width of the picture, about.
+const LINES: f64 = 9.0;
+/// The floor fades between these multiples of its distance at the lower edge of the picture.
+const FADE: [f64; 2] = [1.1, 2.6];
+
+/// Draws the floor at a height. From below, the floor is invisible.
+pub(super) fn draw_floor(canvas: &mut Pixmap, camera: &Camera, floor: f64) {
+    let (width, height) = (canvas.width() as usize, canvas.height() as usize);
+    let n = f64::from(OVERSAMPLING);
+    let row_at = |row: f64| camera.floor_row(n * row, floor, n * width as f64);
+    let Some(nearest) = row_at(height as f64) else { return };
+    let spacing = round_length(width as f64 * n * nearest.pixel / LINES);
+    for (row, pixels) in canvas.data_mut().chunks_exact_mut(4 * width).enumerate() {
+        let (Some(this), Some(next)) = (row_at(row as f64 + 0.5), row_at(row as f64 + 1.5)) else { continue };
+        let far = ((this.pixel / nearest.pixel - FADE[0]) / (FADE[1] - FADE[0])).clamp(0.0, 1.0);
+        let strength = (1.0 - far * far * (3.0 - 2.0 * far)) as f32;
+        if strength == 0.0 {
+            continue;
+        }
+        for (column, pixel) in pixels.chunks_exact_mut(4).enumerate() {
+            let across = n * (column as f64 + 0.5);
+            let lines = [0, 1].map(|axis| {
+                let [at, below] = [this, next].map(|row| row.start[axis] + across * row.step[axis]);
+                covered(at, (below - at).abs() + n * this.step[axis].abs(), spacing)
+            });
+            let light = TONE * (1.0 - (1.0 - LINE) * lines[0].max(lines[1]) as f32);
+            let light = 1.0 - strength * (1.0 - light);
+            pixel[..3].iter_mut().for_each(|byte| *byte = (f32::from(*byte) * light + 0.5) as u8);
+        }
+    }
+}
+
+/// Returns the part of a pixel with this extent, in m, that lines cover.
+fn covered(at: f64, extent: f64, spacing: f64) -> f64 {
+    let part = at / spacing;
+    let distance = spacing * (part - (part + 0.5).floor()).abs();
+    let (half, line) = (0.5 * extent, 0.5 * WIDTH * spacing);
+    ((distance + half).min(line) - (distance - half).max(-line)).max(0.0) / extent
+}
+
+/// Returns 1, 2 or 5 times a power of ten, at most the given length.
+fn round_length(length: f64) -> f64 {
+    let power = 10.0_f64.powf(length.log10().floor());
+    power * if length >= 5.0 * power { 5.0 } else if length >= 2.0 * power { 2.0 } else { 1.0 }
+}

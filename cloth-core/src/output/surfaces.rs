@@ -1,0 +1,155 @@
+//! Cloth and solids of a picture as one fine mesh, with colours and light at its vertices.
+
+use energy_dsl::Vector3;
+
+use super::picture::View;
+use super::projection::Camera;
+use super::raster::{Canvas, Corner};
+use super::shade::{Colours, lit, mixed, shade, sides, towards_lamp};
+use super::smooth_surface::SmoothSurface;
+use super::style::{OVERSAMPLING, garment_colour};
+use super::visibility::{Occluders, Visibility};
+use crate::geometry::{cross, dot, subtract};
+
+const SOLID: Colours = [[0.16, 0.15, 0.14], [0.86, 0.83, 0.78]];
+const EDGE: [f32; 3] = [0.08, 0.09, 0.11];
+/// Line width of edges, and of the rim of cloth, in pixels before downsampling.
+const LINE: f64 = 1.5 * OVERSAMPLING as f64;
+const RIM: f64 = 1.3 * OVERSAMPLING as f64;
+/// How much brighter the rim is than the cloth.
+const RIM_LIGHT: f32 = 0.14;
+
+/// Size of the triangles that are drawn, in pixels before downsampling.
+const FINE: f64 = 8.0 * OVERSAMPLING as f64;
+/// The finest division of an edge, and the largest number of triangles that division makes.
+const FINEST: f64 = 16.0;
+const MOST_TRIANGLES: f64 = 300_000.0;
+/// Cosines of the angles from which on an edge is sharp. Cloth has no creases: a fold is smooth, however tight.
+const NO_CREASE: f64 = -1.0;
+const CREASE: f64 = 0.5;
+
+/// Solids lie this much deeper, relative to their depth, so that smooth cloth on them stays in front.
+const BEHIND: f64 = 1.001;
+/// Lines lie this much nearer than the surfaces that they are drawn on.
+const BEFORE: f64 = 0.9995;
+/// Vertices whose normals have a smaller cosine with the direction to the eye can be seen from both sides.
+const EDGE_ON: f64 = 0.4;
+
+/// Cloth and solids; the vertices and segments of cloth come first.
+pub(super) struct Surfaces {
+    fine: SmoothSurface,
+    cloth_vertices: usize,
+    cloth_segments: usize,
+}
+
+impl Surfaces {
+    /// Smooths the surfaces of a view as far as the camera shows it.
+    pub(super) fn of(view: &View<'_>, camera: &Camera) -> Self {
+        let parts = level(camera, view.positions, view.triangles);
+        let mut fine = SmoothSurface::of(view.positions, view.triangles, parts, NO_CREASE);
+        let (cloth_vertices, cloth_segments) = (fine.points.len(), fine.segments.len());
+        for solid in view.solids {
+            let parts = level(camera, &solid.vertices, &solid.triangles);
+            fine.append(SmoothSurface::of(&solid.vertices, &solid.triangles, parts, CREASE));
+        }
+        Self { fine, cloth_vertices, cloth_segments }
+    }
+
+    /// Draws the surfaces, which receive shadows from each other and from hair, then the rims of cloth, then its edges
+    /// if they are wanted.
+    pub(super) fn draw(&self, canvas: &mut Canvas, camera: &Camera, view: &View<'_>) {
+        let fine = &self.fine;
+        let lamp = towards_lamp();
+        let facing = fine.points.iter().zip(&fine.normals).map(|(point, normal)| dot(*normal, camera.towards_eye(*point)));
+        let wanted: Vec<[bool; 2]> = facing.map(|cosine| [cosine > -EDGE_ON, cosine < EDGE_ON]).collect();
+        let (points, segments) = self.with_hair(view);
+        let occluders = Occluders { points: &points, triangles: &fine.triangles, segments: &segments };
+        let visibility = Visibility::of(&occluders, &fine.normals, &wanted, lamp);
+        let corners: Vec<[Corner; 2]> = (0..fine.points.len())
+            .map(|vertex| {
+                let (point, normal) = (fine.points[vertex], fine.normals[vertex]);
+                let (place, depth) = camera.project(point);
+                let depth = if vertex < self.cloth_vertices { depth } else { BEHIND * depth };
+                let eye = camera.towards_eye(point);
+                [(0, 1.0), (1, -1.0)].map(|(side, sign)| {
+                    let seen = [visibility.lamp[vertex][side], visibility.sky[vertex][side]].map(f64::from);
+                    let brightness = shade(normal.map(|component| sign * component), lamp, eye, seen);
+                    Corner { place, depth, colour: mixed(&self.colours(view, vertex, side), brightness) }
+                })
+            })
+            .collect();
+        for triangle in &fine.triangles {
+            let side = self.side(camera, triangle);
+            canvas.triangle(triangle.map(|vertex| corners[vertex][side]));
+        }
+        self.draw_lines(canvas, camera, &corners, view.look.wireframe);
+    }
+
+    /// Returns the vertices with those of hair behind them, and the segments of hair.
+    fn with_hair(&self, view: &View<'_>) -> (Vec<Vector3<f64>>, Vec<[usize; 2]>) {
+        let (mut points, mut segments) = (self.fine.points.clone(), Vec::new());
+        for strand in view.strands {
+            let first = points.len();
+            points.extend(&view.positions[strand.clone()]);
+            segments.extend((first + 1..points.len()).map(|end| [end - 1, end]));
+        }
+        (points, segments)
+    }
+
+    /// Returns the side of a triangle that the eye sees: 0 for the front, 1 for the back.
+    fn side(&self, camera: &Camera, triangle: &[usize; 3]) -> usize {
+        let [a, b, c] = triangle.map(|vertex| self.fine.points[vertex]);
+        usize::from(dot(cross(subtract(b, a), subtract(c, a)), camera.towards_eye(a)) < 0.0)
+    }
+
+    /// Returns the colours of a side of a vertex: those of the vertices around it in the view, weighted.
+    fn colours(&self, view: &View<'_>, vertex: usize, side: usize) -> Colours {
+        if vertex >= self.cloth_vertices {
+            return SOLID;
+        }
+        let (vertices, weights) = self.fine.origins[vertex];
+        let own = |vertex: usize| {
+            let shown = view.look.colours.and_then(|colours| colours.get(vertex)).map(|colour| lit(*colour));
+            let garment = view.garment_colours.get(vertex).copied().flatten();
+            shown.unwrap_or_else(|| sides(garment.unwrap_or(garment_colour(0)))[side])
+        };
+        let all = vertices.map(own);
+        [0, 1].map(|light| {
+            std::array::from_fn(|channel| (0..3).map(|corner| weights[corner] * all[corner][light][channel]).sum())
+        })
+    }
+
+    /// Draws the rim of cloth, which shows its thickness, and the edges of its triangles.
+    fn draw_lines(&self, canvas: &mut Canvas, camera: &Camera, corners: &[[Corner; 2]], wireframe: bool) {
+        for (ends, is_border) in &self.fine.segments[..self.cloth_segments] {
+            if !is_border && !wireframe {
+                continue;
+            }
+            let [from, to] = ends.map(|vertex| {
+                let side = usize::from(dot(self.fine.normals[vertex], camera.towards_eye(self.fine.points[vertex])) < 0.0);
+                let Corner { place, depth, colour } = corners[vertex][side];
+                let colour = if wireframe { EDGE } else { colour.map(|channel| channel + RIM_LIGHT * (1.0 - channel)) };
+                Corner { place, depth: BEFORE * depth, colour }
+            });
+            canvas.line(from, to, if wireframe { LINE } else { RIM });
+        }
+    }
+}
+
+/// Returns the number of parts of an edge that makes the triangles of a mesh as small in the picture as they should be,
+/// for nine of ten edges.
+fn level(camera: &Camera, points: &[Vector3<f64>], triangles: &[[usize; 3]]) -> usize {
+    let length = |[a, b, _]: &[usize; 3]| {
+        let [(from, depth), (to, other)] = [*a, *b].map(|vertex| camera.project(points[vertex]));
+        let length = (to[0] - from[0]).hypot(to[1] - from[1]);
+        (depth > 0.0 && other > 0.0 && length.is_finite()).then_some(length)
+    };
+    let mut lengths: Vec<f64> = triangles.iter().filter_map(length).collect();
+    if lengths.is_empty() {
+        return 1;
+    }
+    let place = lengths.len() * 9 / 10;
+    let (_, longest, _) = lengths.select_nth_unstable_by(place, f64::total_cmp);
+    let most = (MOST_TRIANGLES / triangles.len() as f64).sqrt();
+    (*longest / FINE).ceil().min(FINEST).min(most).max(1.0) as usize
+}
