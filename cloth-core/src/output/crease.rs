@@ -63,6 +63,42 @@ impl Creased {
     }
 }
 
+/// Returns the limits of the vertices of a cloth in a Loop subdivision (Loop 1987). Those of borders are the limits of
+/// their cubic spline; corners stay.
+pub(super) fn fair(points: &[Vector3<f64>], triangles: &[[usize; 3]]) -> Vec<Vector3<f64>> {
+    let sides = sorted_sides(triangles);
+    let mut sums = vec![([0.0; 3], 0.0); points.len()];
+    let mut sharp = Vec::new();
+    for group in sides.chunk_by(|a, b| a.0 == b.0) {
+        let [a, b] = group[0].0;
+        for (vertex, other) in [(a, b), (b, a)] {
+            let (sum, count) = sums[vertex];
+            sums[vertex] = (add_scaled(sum, 1.0, points[other]), count + 1.0);
+        }
+        if group.len() != 2 {
+            sharp.push([a, b]);
+        }
+    }
+    let curves = curves(points, &sharp);
+    let limit = |((point, (sum, count)), curve): ((&Vector3<f64>, (Vector3<f64>, f64)), &Curve)| {
+        let (sum, count, weight) = match curve {
+            Curve::None if count > 2.0 => (sum, count, loop_limit_weight(count)),
+            Curve::Through([a, b]) => (add_scaled(points[*a], 1.0, points[*b]), 2.0, 1.0 / 6.0),
+            _ => return *point,
+        };
+        add_scaled(point.map(|component| (1.0 - weight * count) * component), weight, sum)
+    };
+    points.iter().zip(sums).zip(&curves).map(limit).collect()
+}
+
+/// Returns the weight of each of `count` neighbours in the limit of a vertex: 1/(n + 3/(8 β)) with the weight β of
+/// Loop's rule.
+fn loop_limit_weight(count: f64) -> f64 {
+    let part = 0.375 + 0.25 * (std::f64::consts::TAU / count).cos();
+    let beta = (0.625 - part * part) / count;
+    1.0 / (count + 0.375 / beta)
+}
+
 fn sorted_sides(triangles: &[[usize; 3]]) -> Vec<Side> {
     let side = |(triangle, corners): (usize, &[usize; 3])| {
         let corners = *corners;
@@ -151,33 +187,46 @@ fn normals(points: &[Vector3<f64>], originals: &[[usize; 3]], split: &[[usize; 3
     sums.into_iter().map(|sum| if sum == [0.0; 3] { [0.0, 0.0, 1.0] } else { unit_or_zero(sum) }).collect()
 }
 
-/// Returns the tangents at vertices where two sharp edges meet. With edges a and b on either side, the direction
-/// a ‖b‖/‖a‖ + b ‖a‖/‖b‖ is exact on circles.
-fn tangents(points: &[Vector3<f64>], sharp: &[[usize; 2]]) -> Vec<Vector3<f64>> {
-    let mut neighbours = vec![([usize::MAX; 2], 0_u8); points.len()];
+/// The curve of sharp edges at a vertex.
+#[derive(Clone, Copy)]
+enum Curve {
+    None,
+    /// One sharp edge.
+    End(usize),
+    /// From one neighbour to another, smoothly.
+    Through([usize; 2]),
+    /// A corner, or more than two sharp edges.
+    Corner,
+}
+
+/// Returns the curve at each vertex.
+fn curves(points: &[Vector3<f64>], sharp: &[[usize; 2]]) -> Vec<Curve> {
+    let mut curves = vec![Curve::None; points.len()];
     for &[a, b] in sharp {
         for (vertex, other) in [(a, b), (b, a)] {
-            let (both, count) = &mut neighbours[vertex];
-            if let Some(place) = both.get_mut(usize::from(*count)) {
-                *place = other;
-            }
-            *count = count.saturating_add(1);
+            let turn = |from: usize| {
+                let (before, after) = (subtract(points[vertex], points[from]), subtract(points[other], points[vertex]));
+                dot(before, after) > CORNER * norm(before) * norm(after)
+            };
+            curves[vertex] = match curves[vertex] {
+                Curve::None => Curve::End(other),
+                Curve::End(from) if turn(from) => Curve::Through([from, other]),
+                _ => Curve::Corner,
+            };
         }
     }
-    let tangent = |(point, &([from, to], count)): (&Vector3<f64>, &([usize; 2], u8))| {
-        if count != 2 {
-            return [0.0; 3];
-        }
+    curves
+}
+
+/// Returns the tangents of curves. Between edges a and b, the direction a ‖b‖/‖a‖ + b ‖a‖/‖b‖ is exact on circles.
+fn tangents(points: &[Vector3<f64>], sharp: &[[usize; 2]]) -> Vec<Vector3<f64>> {
+    let tangent = |(point, curve): (&Vector3<f64>, Curve)| {
+        let Curve::Through([from, to]) = curve else { return [0.0; 3] };
         let (a, b) = (subtract(*point, points[from]), subtract(points[to], *point));
-        let [long, short] = [norm(a), norm(b)];
-        if dot(a, b) > CORNER * long * short {
-            let sum = add_scaled(a.map(|component| component * short / long), long / short, b);
-            unit_or_zero(sum)
-        } else {
-            [0.0; 3]
-        }
+        let ratio = norm(b) / norm(a);
+        unit_or_zero(add_scaled(a.map(|component| ratio * component), 1.0 / ratio, b))
     };
-    points.iter().zip(&neighbours).map(tangent).collect()
+    points.iter().zip(curves(points, sharp)).map(tangent).collect()
 }
 
 /// Returns the unit vector of a direction, or zero if it has none.

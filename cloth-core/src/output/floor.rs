@@ -44,8 +44,8 @@ pub(super) fn draw_floor(canvas: &mut Pixmap, camera: &Camera, floor: f64) {
 
 /// Returns the part of a pixel with this extent, in m, that lines cover.
 fn covered(at: f64, extent: f64, spacing: f64) -> f64 {
-    let part = at / spacing;
-    let distance = spacing * (part - (part + 0.5).floor()).abs();
+    let part = (at / spacing).abs();
+    let distance = spacing * (part - (part + 0.5) as u64 as f64).abs();
     let (half, line) = (0.5 * extent, 0.5 * WIDTH * spacing);
     ((distance + half).min(line) - (distance - half).max(-line)).max(0.0) / extent
 }

@@ -84,7 +84,7 @@ pub fn picture_png(view: &View<'_>) -> Result<Vec<u8>, PictureError> {
     draw_background(&mut picture, view.style.background);
     draw_floor(&mut picture, &camera, floor);
     draw_shadow(&mut picture, &camera, (&everything, floor), &all_triangles(view), view);
-    Surfaces::of(view, &camera).draw(&mut canvas, &camera, view);
+    Surfaces::shown(view, &camera).draw(&mut canvas, &camera, view);
     let own = |vertex: usize| {
         let shown = view.look.colours.and_then(|colours| colours.get(vertex));
         shown.copied().or(view.garment_colours.get(vertex).copied().flatten()).map(lit)

@@ -7,11 +7,14 @@ use std::collections::HashMap;
 
 use energy_dsl::Vector3;
 
-use super::crease::{Creased, Edge, unit_or_zero};
+use super::crease::{Creased, Edge, fair, unit_or_zero};
 use crate::geometry::{add_scaled, dot, norm, subtract};
 
 /// Handles of curves reach at most this part of the chord's projection on a tangent plane.
 const LONGEST_HANDLE: f64 = 0.6;
+
+/// Cosine of the angle from which on an edge of a solid is sharp.
+const CREASE: f64 = 0.5;
 
 /// A finer mesh on the smooth surface of another one.
 #[derive(Debug, Default)]
@@ -26,9 +29,20 @@ pub(super) struct SmoothSurface {
 }
 
 impl SmoothSurface {
-    /// Divides each triangle into `level`² triangles. Edges are sharp where the normals beside them have a cosine below
-    /// `crease`.
-    pub(super) fn of(points: &[Vector3<f64>], triangles: &[[usize; 3]], level: usize, crease: f64) -> Self {
+    /// Divides each triangle of a cloth into `level`² triangles. Vertices move to the limit of a Loop subdivision, which
+    /// removes the bumps of folds between rows of vertices. Cloth has no creases: a fold is smooth, however tight.
+    pub(super) fn of_cloth(points: &[Vector3<f64>], triangles: &[[usize; 3]], level: usize) -> Self {
+        let fair = fair(points, triangles);
+        Self::of(&fair, triangles, level, -1.0)
+    }
+
+    /// Divides each triangle of a solid into `level`² triangles.
+    pub(super) fn of_solid(points: &[Vector3<f64>], triangles: &[[usize; 3]], level: usize) -> Self {
+        Self::of(points, triangles, level, CREASE)
+    }
+
+    /// Divides triangles. Edges are sharp where the normals beside them have a cosine below `crease`.
+    fn of(points: &[Vector3<f64>], triangles: &[[usize; 3]], level: usize, crease: f64) -> Self {
         let creased = Creased::of(points, triangles, crease);
         let originals = &creased.originals;
         let mut surface = Self {

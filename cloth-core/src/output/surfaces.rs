@@ -8,8 +8,8 @@ use super::raster::{Canvas, Corner};
 use super::shade::{Colours, lit, mixed, shade, sides, towards_lamp};
 use super::smooth_surface::SmoothSurface;
 use super::style::{OVERSAMPLING, garment_colour};
-use super::visibility::{Occluders, Visibility};
-use crate::geometry::{cross, dot, subtract};
+use super::visibility::{Occluders, Receivers, Visibility, resolution};
+use crate::geometry::{cross, dot, norm, subtract};
 
 const SOLID: Colours = [[0.16, 0.15, 0.14], [0.86, 0.83, 0.78]];
 const EDGE: [f32; 3] = [0.08, 0.09, 0.11];
@@ -24,16 +24,15 @@ const FINE: f64 = 8.0 * OVERSAMPLING as f64;
 /// The finest division of an edge, and the largest number of triangles that division makes.
 const FINEST: f64 = 16.0;
 const MOST_TRIANGLES: f64 = 300_000.0;
-/// Cosines of the angles from which on an edge is sharp. Cloth has no creases: a fold is smooth, however tight.
-const NO_CREASE: f64 = -1.0;
-const CREASE: f64 = 0.5;
-
 /// Solids lie this much deeper, relative to their depth, so that smooth cloth on them stays in front.
 const BEHIND: f64 = 1.001;
 /// Lines lie this much nearer than the surfaces that they are drawn on.
 const BEFORE: f64 = 0.9995;
 /// Vertices whose normals have a smaller cosine with the direction to the eye can be seen from both sides.
 const EDGE_ON: f64 = 0.4;
+
+/// Size of the triangles that cast shadows, in pixels of a depth map.
+const CASTING: f64 = 6.0;
 
 /// Cloth and solids; the vertices and segments of cloth come first.
 pub(super) struct Surfaces {
@@ -43,16 +42,27 @@ pub(super) struct Surfaces {
 }
 
 impl Surfaces {
-    /// Smooths the surfaces of a view as far as the camera shows it.
-    pub(super) fn of(view: &View<'_>, camera: &Camera) -> Self {
-        let parts = level(camera, view.positions, view.triangles);
-        let mut fine = SmoothSurface::of(view.positions, view.triangles, parts, NO_CREASE);
+    /// Smooths the surfaces of a view; `level` returns the number of parts of each edge.
+    fn of(view: &View<'_>, level: impl Fn(&[Vector3<f64>], &[[usize; 3]]) -> usize) -> Self {
+        let parts = level(view.positions, view.triangles);
+        let mut fine = SmoothSurface::of_cloth(view.positions, view.triangles, parts);
         let (cloth_vertices, cloth_segments) = (fine.points.len(), fine.segments.len());
         for solid in view.solids {
-            let parts = level(camera, &solid.vertices, &solid.triangles);
-            fine.append(SmoothSurface::of(&solid.vertices, &solid.triangles, parts, CREASE));
+            let parts = level(&solid.vertices, &solid.triangles);
+            fine.append(SmoothSurface::of_solid(&solid.vertices, &solid.triangles, parts));
         }
         Self { fine, cloth_vertices, cloth_segments }
+    }
+
+    /// Returns the surfaces as finely as the camera shows them.
+    pub(super) fn shown(view: &View<'_>, camera: &Camera) -> Self {
+        Self::of(view, |points, triangles| level_in_picture(camera, points, triangles))
+    }
+
+    /// Returns the surfaces as finely as shadows show them.
+    fn casting(view: &View<'_>, everything: &[Vector3<f64>]) -> Self {
+        let longest = CASTING * resolution(everything);
+        Self::of(view, |points, triangles| level_in_space(longest, points, triangles))
     }
 
     /// Draws the surfaces, which receive shadows from each other and from hair, then the rims of cloth, then its edges
@@ -62,9 +72,12 @@ impl Surfaces {
         let lamp = towards_lamp();
         let facing = fine.points.iter().zip(&fine.normals).map(|(point, normal)| dot(*normal, camera.towards_eye(*point)));
         let wanted: Vec<[bool; 2]> = facing.map(|cosine| [cosine > -EDGE_ON, cosine < EDGE_ON]).collect();
-        let (points, segments) = self.with_hair(view);
-        let occluders = Occluders { points: &points, triangles: &fine.triangles, segments: &segments };
-        let visibility = Visibility::of(&occluders, &fine.normals, &wanted, lamp);
+        let casting = Self::casting(view, &fine.points);
+        let (points, segments) = casting.with_hair(view);
+        let occluders = Occluders { points: &points, triangles: &casting.fine.triangles, segments: &segments };
+        let receivers =
+            Receivers { points: &fine.points, normals: &fine.normals, triangles: &fine.triangles, wanted: &wanted };
+        let visibility = Visibility::of(&occluders, &receivers, lamp);
         let corners: Vec<[Corner; 2]> = (0..fine.points.len())
             .map(|vertex| {
                 let (point, normal) = (fine.points[vertex], fine.normals[vertex]);
@@ -136,20 +149,29 @@ impl Surfaces {
     }
 }
 
-/// Returns the number of parts of an edge that makes the triangles of a mesh as small in the picture as they should be,
-/// for nine of ten edges.
-fn level(camera: &Camera, points: &[Vector3<f64>], triangles: &[[usize; 3]]) -> usize {
-    let length = |[a, b, _]: &[usize; 3]| {
-        let [(from, depth), (to, other)] = [*a, *b].map(|vertex| camera.project(points[vertex]));
-        let length = (to[0] - from[0]).hypot(to[1] - from[1]);
-        (depth > 0.0 && other > 0.0 && length.is_finite()).then_some(length)
-    };
-    let mut lengths: Vec<f64> = triangles.iter().filter_map(length).collect();
+/// Returns the number of parts that make edges of these lengths at most this long, for nine of ten edges.
+fn level(lengths: impl Iterator<Item = f64>, longest: f64, triangles: usize) -> usize {
+    let mut lengths: Vec<f64> = lengths.filter(|length| length.is_finite()).collect();
     if lengths.is_empty() {
         return 1;
     }
     let place = lengths.len() * 9 / 10;
-    let (_, longest, _) = lengths.select_nth_unstable_by(place, f64::total_cmp);
-    let most = (MOST_TRIANGLES / triangles.len() as f64).sqrt();
-    (*longest / FINE).ceil().min(FINEST).min(most).max(1.0) as usize
+    let (_, length, _) = lengths.select_nth_unstable_by(place, f64::total_cmp);
+    let most = (MOST_TRIANGLES / triangles as f64).sqrt();
+    (*length / longest).ceil().min(FINEST).min(most).max(1.0) as usize
+}
+
+/// Returns the level of triangles that are small in the picture.
+fn level_in_picture(camera: &Camera, points: &[Vector3<f64>], triangles: &[[usize; 3]]) -> usize {
+    let length = |[a, b, _]: &[usize; 3]| {
+        let [(from, depth), (to, other)] = [*a, *b].map(|vertex| camera.project(points[vertex]));
+        (depth > 0.0 && other > 0.0).then(|| (to[0] - from[0]).hypot(to[1] - from[1]))
+    };
+    level(triangles.iter().filter_map(length), FINE, triangles.len())
+}
+
+/// Returns the level of triangles that are small in space.
+fn level_in_space(longest: f64, points: &[Vector3<f64>], triangles: &[[usize; 3]]) -> usize {
+    let lengths = triangles.iter().map(|&[a, b, _]| norm(subtract(points[b], points[a])));
+    level(lengths, longest, triangles.len())
 }

@@ -33,6 +33,21 @@ pub(super) struct Occluders<'a> {
     pub segments: &'a [[usize; 2]],
 }
 
+/// A surface that receives shadows.
+pub(super) struct Receivers<'a> {
+    pub points: &'a [Vector3<f64>],
+    /// Unit normals.
+    pub normals: &'a [Vector3<f64>],
+    pub triangles: &'a [[usize; 3]],
+    /// The wanted sides of each vertex, front and back. Others see everything.
+    pub wanted: &'a [[bool; 2]],
+}
+
+/// Size of the details of shadows of these points, in m.
+pub(super) fn resolution(points: &[Vector3<f64>]) -> f64 {
+    DepthMap::over(points).pixel
+}
+
 /// The seen parts of the lamp and of the surroundings, from 0 to 1: for each vertex, on its front and on its back.
 pub(super) struct Visibility {
     pub lamp: Vec<[f32; 2]>,
@@ -40,17 +55,11 @@ pub(super) struct Visibility {
 }
 
 impl Visibility {
-    /// Computes the visibility of all vertices, which have these unit normals, on the wanted sides: front and back.
-    /// Unwanted sides see everything.
-    pub(super) fn of(
-        occluders: &Occluders<'_>,
-        normals: &[Vector3<f64>],
-        wanted: &[[bool; 2]],
-        lamp: Vector3<f64>,
-    ) -> Self {
+    /// Computes the visibility of the vertices of a surface.
+    pub(super) fn of(occluders: &Occluders<'_>, receivers: &Receivers<'_>, lamp: Vector3<f64>) -> Self {
         let [lamp, sky] = [lamp_directions(lamp, LAMP_DIRECTIONS), sphere()].map(|directions| {
-            let mut parts = seen_parts(occluders, normals, wanted, &directions);
-            (0..SMOOTHINGS).for_each(|_| smooth(&mut parts, occluders.triangles));
+            let mut parts = seen_parts(occluders, receivers, &directions);
+            (0..SMOOTHINGS).for_each(|_| smooth(&mut parts, receivers.triangles));
             parts
         });
         Self { lamp, sky }
@@ -58,26 +67,21 @@ impl Visibility {
 }
 
 /// Returns the part of the directions that each vertex sees, weighted by the cosine with its normal.
-fn seen_parts(
-    occluders: &Occluders<'_>,
-    normals: &[Vector3<f64>],
-    wanted: &[[bool; 2]],
-    directions: &[Vector3<f64>],
-) -> Vec<[f32; 2]> {
-    let mut sums = vec![[[0.0_f64; 2]; 2]; normals.len()];
+fn seen_parts(occluders: &Occluders<'_>, receivers: &Receivers<'_>, directions: &[Vector3<f64>]) -> Vec<[f32; 2]> {
+    let mut sums = vec![[[0.0_f64; 2]; 2]; receivers.points.len()];
     let mut map = DepthMap::over(occluders.points);
     for &direction in directions {
         map.draw(occluders, direction);
-        for (vertex, (sums, normal)) in sums.iter_mut().zip(normals).enumerate() {
-            let cosine = dot(*normal, direction);
+        for (vertex, sums) in sums.iter_mut().enumerate() {
+            let normal = receivers.normals[vertex];
+            let cosine = dot(normal, direction);
             // The front sees this direction or the back does.
             let (side, sign) = if cosine >= 0.0 { (0, 1.0) } else { (1, -1.0) };
-            if !wanted[vertex][side] {
+            if !receivers.wanted[vertex][side] {
                 continue;
             }
-            let lift = map.lift(sign, *normal);
-            let place = map.places[vertex];
-            sums[side][0] += cosine.abs() * map.seen([0, 1, 2].map(|axis| place[axis] + lift[axis]));
+            let lifted = add_scaled(receivers.points[vertex], sign * LIFT * map.pixel, normal);
+            sums[side][0] += cosine.abs() * map.seen(map.place(lifted));
             sums[side][1] += cosine.abs();
         }
     }
@@ -144,8 +148,6 @@ struct DepthMap {
     axes: [Vector3<f64>; 3],
     /// The largest coordinate towards the light, in m.
     nearest: Vec<f32>,
-    /// Pixel and coordinate towards the light of each point.
-    places: Vec<[f64; 3]>,
 }
 
 impl DepthMap {
@@ -154,7 +156,7 @@ impl DepthMap {
         let centre = [0, 1, 2].map(|axis| bounds.middle(axis));
         let radius = points.iter().map(|p| norm(subtract(*p, centre))).fold(f64::MIN_POSITIVE, f64::max);
         let pixel = 2.0 * radius / (MAP - 4) as f64;
-        Self { centre, radius, pixel, axes: [[0.0; 3]; 3], nearest: vec![f32::NEG_INFINITY; MAP * MAP], places: Vec::new() }
+        Self { centre, radius, pixel, axes: [[0.0; 3]; 3], nearest: vec![f32::NEG_INFINITY; MAP * MAP] }
     }
 
     fn draw(&mut self, occluders: &Occluders<'_>, direction: Vector3<f64>) {
@@ -164,7 +166,6 @@ impl DepthMap {
         let places: Vec<[f64; 3]> = occluders.points.iter().map(|point| self.place(*point)).collect();
         occluders.triangles.iter().for_each(|corners| self.triangle(corners.map(|corner| places[corner])));
         occluders.segments.iter().for_each(|ends| self.segment(ends.map(|end| places[end])));
-        self.places = places;
     }
 
     /// Returns the pixel and the coordinate towards the light.
@@ -196,12 +197,6 @@ impl DepthMap {
             let [x, y, near] = [0, 1, 2].map(|axis| from[axis] + part * (to[axis] - from[axis]));
             self.mark(x.max(0.0) as usize, y.max(0.0) as usize, near);
         }
-    }
-
-    /// Returns how far a place moves if its point leaves the surface along the normal.
-    fn lift(&self, sign: f64, normal: Vector3<f64>) -> [f64; 3] {
-        let [x, y, near] = self.axes.map(|axis| sign * LIFT * dot(axis, normal));
-        [x, y, near * self.pixel]
     }
 
     /// Returns the part of the light that the pixels around a place let through.
