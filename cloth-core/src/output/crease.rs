@@ -8,7 +8,7 @@ use crate::geometry::{add_scaled, cross, dot, norm, subtract};
 const CORNER: f64 = 0.342;
 
 /// An edge of a triangle: its vertices in ascending order, and the triangle with the index of the edge's first corner.
-type Side = ([usize; 2], usize, usize);
+pub(super) type Side = ([usize; 2], usize, usize);
 
 /// A mesh whose vertices are split along its sharp edges: each smooth part has vertices of its own.
 pub(super) struct Creased {
@@ -63,43 +63,8 @@ impl Creased {
     }
 }
 
-/// Returns the limits of the vertices of a cloth in a Loop subdivision (Loop 1987). Those of borders are the limits of
-/// their cubic spline; corners stay.
-pub(super) fn fair(points: &[Vector3<f64>], triangles: &[[usize; 3]]) -> Vec<Vector3<f64>> {
-    let sides = sorted_sides(triangles);
-    let mut sums = vec![([0.0; 3], 0.0); points.len()];
-    let mut sharp = Vec::new();
-    for group in sides.chunk_by(|a, b| a.0 == b.0) {
-        let [a, b] = group[0].0;
-        for (vertex, other) in [(a, b), (b, a)] {
-            let (sum, count) = sums[vertex];
-            sums[vertex] = (add_scaled(sum, 1.0, points[other]), count + 1.0);
-        }
-        if group.len() != 2 {
-            sharp.push([a, b]);
-        }
-    }
-    let curves = curves(points, &sharp);
-    let limit = |((point, (sum, count)), curve): ((&Vector3<f64>, (Vector3<f64>, f64)), &Curve)| {
-        let (sum, count, weight) = match curve {
-            Curve::None if count > 2.0 => (sum, count, loop_limit_weight(count)),
-            Curve::Through([a, b]) => (add_scaled(points[*a], 1.0, points[*b]), 2.0, 1.0 / 6.0),
-            _ => return *point,
-        };
-        add_scaled(point.map(|component| (1.0 - weight * count) * component), weight, sum)
-    };
-    points.iter().zip(sums).zip(&curves).map(limit).collect()
-}
-
-/// Returns the weight of each of `count` neighbours in the limit of a vertex: 1/(n + 3/(8 β)) with the weight β of
-/// Loop's rule.
-fn loop_limit_weight(count: f64) -> f64 {
-    let part = 0.375 + 0.25 * (std::f64::consts::TAU / count).cos();
-    let beta = (0.625 - part * part) / count;
-    1.0 / (count + 0.375 / beta)
-}
-
-fn sorted_sides(triangles: &[[usize; 3]]) -> Vec<Side> {
+/// Returns the edges of all triangles, those of one edge in a row.
+pub(super) fn sorted_sides(triangles: &[[usize; 3]]) -> Vec<Side> {
     let side = |(triangle, corners): (usize, &[usize; 3])| {
         let corners = *corners;
         (0..3).map(move |from| {
@@ -189,7 +154,7 @@ fn normals(points: &[Vector3<f64>], originals: &[[usize; 3]], split: &[[usize; 3
 
 /// The curve of sharp edges at a vertex.
 #[derive(Clone, Copy)]
-enum Curve {
+pub(super) enum Curve {
     None,
     /// One sharp edge.
     End(usize),
@@ -200,7 +165,7 @@ enum Curve {
 }
 
 /// Returns the curve at each vertex.
-fn curves(points: &[Vector3<f64>], sharp: &[[usize; 2]]) -> Vec<Curve> {
+pub(super) fn curves(points: &[Vector3<f64>], sharp: &[[usize; 2]]) -> Vec<Curve> {
     let mut curves = vec![Curve::None; points.len()];
     for &[a, b] in sharp {
         for (vertex, other) in [(a, b), (b, a)] {

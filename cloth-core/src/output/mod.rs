@@ -16,6 +16,7 @@ mod show;
 mod smooth_surface;
 mod solid_mesh;
 mod style;
+mod subdivision;
 mod surfaces;
 mod track;
 mod usd;

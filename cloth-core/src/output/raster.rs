@@ -91,13 +91,17 @@ pub(super) fn for_each_pixel(
             (x * (c[1] - a[1]) - y * (c[0] - a[0])) * part,
             (y * (b[0] - a[0]) - x * (b[1] - a[1])) * part,
         ];
+        let mut is_inside = false;
         for column in columns.0..columns.1 {
             let offset = (column - columns.0) as f64;
             let [second, third] = [starts[0] + offset * steps[0], starts[1] + offset * steps[1]];
             let first = 1.0 - second - third;
             // A tiny overlap: rounding leaves no gap between neighbours.
-            if first.min(second).min(third) >= -1e-9 {
+            if first >= -1e-9 && second >= -1e-9 && third >= -1e-9 {
+                is_inside = true;
                 visit(row * size[0] + column, [first, second, third]);
+            } else if is_inside {
+                break;
             }
         }
     }

@@ -1,4 +1,4 @@
-//! Smooth surfaces through the vertices of meshes, for pictures: a cubic patch per triangle (curved PN triangles,
+//! Smooth surfaces of meshes, for pictures: a cubic patch per triangle (curved PN triangles,
 //! Vlachos et al. 2001), which follows the normals inside and the curve of neighbouring edges along borders and creases.
 //!
 //! A curve depends on its ends only, so that patches meet without gaps.
@@ -7,7 +7,8 @@ use std::collections::HashMap;
 
 use energy_dsl::Vector3;
 
-use super::crease::{Creased, Edge, fair, unit_or_zero};
+use super::crease::{Creased, Edge, unit_or_zero};
+use super::subdivision::Subdivided;
 use crate::geometry::{add_scaled, dot, norm, subtract};
 
 /// Handles of curves reach at most this part of the chord's projection on a tangent plane.
@@ -22,34 +23,58 @@ pub(super) struct SmoothSurface {
     pub points: Vec<Vector3<f64>>,
     pub normals: Vec<Vector3<f64>>,
     pub triangles: Vec<[usize; 3]>,
-    /// Vertices of the other mesh near each point, with weights that add up to one.
+    /// The corners of the patches.
+    pub corners: Vec<PatchCorner>,
+    pub patches: Vec<[usize; 3]>,
+    /// Corners near each point, with weights that add up to one.
     pub origins: Vec<([usize; 3], [f32; 3])>,
-    /// Segments along the edges of the other mesh; `true` for those along borders.
-    pub segments: Vec<([usize; 2], bool)>,
+    pub segments: Vec<Segment>,
+}
+
+/// A corner of patches.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct PatchCorner {
+    /// Its number among the points of the surface.
+    pub point: usize,
+    /// The vertices of the original mesh in whose middle it lies; twice the same one at a vertex.
+    pub parents: [usize; 2],
+}
+
+/// A segment along an edge of a patch.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Segment {
+    pub ends: [usize; 2],
+    pub is_border: bool,
+    /// Whether it lies on an edge of the original mesh.
+    pub is_edge: bool,
 }
 
 impl SmoothSurface {
-    /// Divides each triangle of a cloth into `level`² triangles. Vertices move to the limit of a Loop subdivision, which
-    /// removes the bumps of folds between rows of vertices. Cloth has no creases: a fold is smooth, however tight.
+    /// Divides each triangle of a cloth into about `level`² triangles on the limit of its subdivision. Cloth has no
+    /// creases: a fold is smooth, however tight.
     pub(super) fn of_cloth(points: &[Vector3<f64>], triangles: &[[usize; 3]], level: usize) -> Self {
-        let fair = fair(points, triangles);
-        Self::of(&fair, triangles, level, -1.0)
+        let mesh = if level > 1 { Subdivided::once(points, triangles) } else { Subdivided::none(points, triangles) };
+        Self::of(&mesh.at_limit(), level.div_ceil(2), -1.0)
     }
 
-    /// Divides each triangle of a solid into `level`² triangles.
+    /// Divides each triangle of a solid into `level`² triangles on a surface through its vertices.
     pub(super) fn of_solid(points: &[Vector3<f64>], triangles: &[[usize; 3]], level: usize) -> Self {
-        Self::of(points, triangles, level, CREASE)
+        Self::of(&Subdivided::none(points, triangles), level, CREASE)
     }
 
     /// Divides triangles. Edges are sharp where the normals beside them have a cosine below `crease`.
-    fn of(points: &[Vector3<f64>], triangles: &[[usize; 3]], level: usize, crease: f64) -> Self {
+    fn of(mesh: &Subdivided, level: usize, crease: f64) -> Self {
+        let Subdivided { points, triangles, parents } = mesh;
         let creased = Creased::of(points, triangles, crease);
         let originals = &creased.originals;
+        let corner = |(point, &vertex): (usize, &usize)| PatchCorner { point, parents: parents[vertex] };
         let mut surface = Self {
             points: originals.iter().map(|&vertex| points[vertex]).collect(),
             normals: creased.normals.clone(),
             triangles: Vec::with_capacity(level * level * triangles.len()),
-            origins: originals.iter().map(|&vertex| ([vertex; 3], [1.0, 0.0, 0.0])).collect(),
+            corners: originals.iter().enumerate().map(corner).collect(),
+            patches: creased.triangles.clone(),
+            origins: (0..originals.len()).map(|corner| ([corner; 3], [1.0, 0.0, 0.0])).collect(),
             segments: Vec::new(),
         };
         let mut known = HashMap::new();
@@ -68,12 +93,16 @@ impl SmoothSurface {
 
     /// Adds another surface.
     pub(super) fn append(&mut self, other: Self) {
-        let first = self.points.len();
+        let (first, corner) = (self.points.len(), self.corners.len());
         self.points.extend(other.points);
         self.normals.extend(other.normals);
-        self.triangles.extend(other.triangles.iter().map(|corners| corners.map(|corner| first + corner)));
-        self.origins.extend(other.origins);
-        self.segments.extend(other.segments.iter().map(|(ends, border)| (ends.map(|end| first + end), *border)));
+        self.triangles.extend(other.triangles.iter().map(|corners| corners.map(|point| first + point)));
+        let moved = |old: &PatchCorner| PatchCorner { point: first + old.point, ..*old };
+        self.corners.extend(other.corners.iter().map(moved));
+        self.patches.extend(other.patches.iter().map(|corners| corners.map(|old| corner + old)));
+        self.origins.extend(other.origins.iter().map(|(corners, weights)| (corners.map(|old| corner + old), *weights)));
+        let moved = |old: &Segment| Segment { ends: old.ends.map(|end| first + end), ..*old };
+        self.segments.extend(other.segments.iter().map(moved));
     }
 
     /// Adds the points inside an edge, from its lower end to its higher one. Returns the first of them.
@@ -92,7 +121,13 @@ impl SmoothSurface {
         let inside = first..first + level - 1;
         let all = std::iter::once(patch.corners[low]).chain(inside).chain([patch.corners[high]]);
         let all: Vec<usize> = all.collect();
-        self.segments.extend(all.windows(2).map(|ends| ([ends[0], ends[1]], is_border)));
+        let is_middle = |corner: usize| {
+            let [one, other] = self.corners[corner].parents;
+            one != other
+        };
+        let is_edge = !(is_middle(patch.corners[low]) && is_middle(patch.corners[high]));
+        let segment = |ends: &[usize]| Segment { ends: [ends[0], ends[1]], is_border, is_edge };
+        self.segments.extend(all.windows(2).map(segment));
         first
     }
 
@@ -134,16 +169,14 @@ impl SmoothSurface {
     fn add_point(&mut self, patch: &Patch, weights: [f64; 3]) {
         self.points.push(patch.point(weights));
         self.normals.push(patch.normal(weights));
-        self.origins.push((patch.vertices, weights.map(|weight| weight as f32)));
+        self.origins.push((patch.corners, weights.map(|weight| weight as f32)));
     }
 }
 
 /// A cubic patch with quadratic normals.
 struct Patch {
     number: usize,
-    /// Corners in the split mesh, and in the original one.
     corners: [usize; 3],
-    vertices: [usize; 3],
     places: [Vector3<f64>; 3],
     /// For each edge the two handles, from the corner of its index on.
     handles: [[Vector3<f64>; 2]; 3],
@@ -186,7 +219,7 @@ impl Patch {
             let other = (edge + 1) % 3;
             middle_normal(subtract(places[other], places[edge]), normals[edge], normals[other])
         });
-        Self { number, corners, vertices, places, handles, centre, normals, middles }
+        Self { number, corners, places, handles, centre, normals, middles }
     }
 
     fn point(&self, [u, v, w]: [f64; 3]) -> Vector3<f64> {

@@ -6,9 +6,9 @@ use super::picture::View;
 use super::projection::Camera;
 use super::raster::{Canvas, Corner};
 use super::shade::{Colours, lit, mixed, shade, sides, towards_lamp};
-use super::smooth_surface::SmoothSurface;
+use super::smooth_surface::{PatchCorner, Segment, SmoothSurface};
 use super::style::{OVERSAMPLING, garment_colour};
-use super::visibility::{Occluders, Receivers, Visibility, resolution};
+use super::visibility::{Occluders, Receivers, resolution, seen_lamp, seen_sky};
 use crate::geometry::{cross, dot, norm, subtract};
 
 const SOLID: Colours = [[0.16, 0.15, 0.14], [0.86, 0.83, 0.78]];
@@ -39,6 +39,12 @@ pub(super) struct Surfaces {
     fine: SmoothSurface,
     cloth_vertices: usize,
     cloth_segments: usize,
+}
+
+/// The seen parts of the lamp at each point, and of the sky at each corner of a patch: on the front and on the back.
+struct Lights {
+    lamp: Vec<[f32; 2]>,
+    sky: Vec<[f32; 2]>,
 }
 
 impl Surfaces {
@@ -75,9 +81,11 @@ impl Surfaces {
         let casting = Self::casting(view, &fine.points);
         let (points, segments) = casting.with_hair(view);
         let occluders = Occluders { points: &points, triangles: &casting.fine.triangles, segments: &segments };
-        let receivers =
-            Receivers { points: &fine.points, normals: &fine.normals, triangles: &fine.triangles, wanted: &wanted };
-        let visibility = Visibility::of(&occluders, &receivers, lamp);
+        let Lights { lamp: sunlit, sky } = self.lights(&occluders, &wanted, lamp);
+        let colours = self.colours(view);
+        let tone = |vertex: usize, side: usize| {
+            [0, 1].map(|light| [0, 1, 2].map(|i| self.between(vertex, |corner| colours[corner][side][light][i])))
+        };
         let corners: Vec<[Corner; 2]> = (0..fine.points.len())
             .map(|vertex| {
                 let (point, normal) = (fine.points[vertex], fine.normals[vertex]);
@@ -85,9 +93,9 @@ impl Surfaces {
                 let depth = if vertex < self.cloth_vertices { depth } else { BEHIND * depth };
                 let eye = camera.towards_eye(point);
                 [(0, 1.0), (1, -1.0)].map(|(side, sign)| {
-                    let seen = [visibility.lamp[vertex][side], visibility.sky[vertex][side]].map(f64::from);
+                    let seen = [sunlit[vertex][side], self.between(vertex, |corner| sky[corner][side])].map(f64::from);
                     let brightness = shade(normal.map(|component| sign * component), lamp, eye, seen);
-                    Corner { place, depth, colour: mixed(&self.colours(view, vertex, side), brightness) }
+                    Corner { place, depth, colour: mixed(&tone(vertex, side), brightness) }
                 })
             })
             .collect();
@@ -115,29 +123,46 @@ impl Surfaces {
         usize::from(dot(cross(subtract(b, a), subtract(c, a)), camera.towards_eye(a)) < 0.0)
     }
 
-    /// Returns the colours of a side of a vertex: those of the vertices around it in the view, weighted.
-    fn colours(&self, view: &View<'_>, vertex: usize, side: usize) -> Colours {
-        if vertex >= self.cloth_vertices {
-            return SOLID;
-        }
-        let (vertices, weights) = self.fine.origins[vertex];
-        let own = |vertex: usize| {
-            let shown = view.look.colours.and_then(|colours| colours.get(vertex)).map(|colour| lit(*colour));
+    /// Returns the light at all points on the wanted sides. That of the sky varies little: the corners of patches do.
+    fn lights(&self, occluders: &Occluders<'_>, wanted: &[[bool; 2]], lamp: Vector3<f64>) -> Lights {
+        let SmoothSurface { points, normals, triangles, corners, patches, .. } = &self.fine;
+        let receivers = Receivers { points, normals, triangles, wanted };
+        let lamp = seen_lamp(occluders, &receivers, lamp);
+        let (points, normals): (Vec<_>, Vec<_>) =
+            corners.iter().map(|corner| (points[corner.point], normals[corner.point])).unzip();
+        let wanted = vec![[true; 2]; corners.len()];
+        let receivers = Receivers { points: &points, normals: &normals, triangles: patches, wanted: &wanted };
+        Lights { lamp, sky: seen_sky(occluders, &receivers) }
+    }
+
+    /// Interpolates a value at the corners of patches.
+    fn between(&self, vertex: usize, value: impl Fn(usize) -> f32) -> f32 {
+        let (corners, weights) = self.fine.origins[vertex];
+        (0..3).map(|number| weights[number] * value(corners[number])).sum()
+    }
+
+    /// Returns the colours of both sides of each corner of a patch.
+    fn colours(&self, view: &View<'_>) -> Vec<[Colours; 2]> {
+        let of_vertex = |vertex: usize| {
+            let shown = view.look.colours.and_then(|colours| colours.get(vertex)).map(|colour| [lit(*colour); 2]);
             let garment = view.garment_colours.get(vertex).copied().flatten();
-            shown.unwrap_or_else(|| sides(garment.unwrap_or(garment_colour(0)))[side])
+            shown.unwrap_or_else(|| sides(garment.unwrap_or(garment_colour(0))))
         };
-        let all = vertices.map(own);
-        [0, 1].map(|light| {
-            std::array::from_fn(|channel| (0..3).map(|corner| weights[corner] * all[corner][light][channel]).sum())
-        })
+        let of_corner = |corner: &PatchCorner| {
+            if corner.point >= self.cloth_vertices {
+                return [SOLID; 2];
+            }
+            let [one, other] = corner.parents.map(of_vertex);
+            let mean = |side: usize, light: usize| [0, 1, 2].map(|i| 0.5 * (one[side][light][i] + other[side][light][i]));
+            [0, 1].map(|side| [0, 1].map(|light| mean(side, light)))
+        };
+        self.fine.corners.iter().map(of_corner).collect()
     }
 
     /// Draws the rim of cloth, which shows its thickness, and the edges of its triangles.
     fn draw_lines(&self, canvas: &mut Canvas, camera: &Camera, corners: &[[Corner; 2]], wireframe: bool) {
-        for (ends, is_border) in &self.fine.segments[..self.cloth_segments] {
-            if !is_border && !wireframe {
-                continue;
-            }
+        let drawn = |segment: &&Segment| if wireframe { segment.is_edge } else { segment.is_border };
+        for Segment { ends, .. } in self.fine.segments[..self.cloth_segments].iter().filter(drawn) {
             let [from, to] = ends.map(|vertex| {
                 let side = usize::from(dot(self.fine.normals[vertex], camera.towards_eye(self.fine.points[vertex])) < 0.0);
                 let Corner { place, depth, colour } = corners[vertex][side];

@@ -15,8 +15,9 @@ const LAMP_DIRECTIONS: usize = 12;
 const LAMP_ANGLE: f64 = 0.1;
 /// Directions of the surroundings.
 const SKY_DIRECTIONS: usize = 42;
-/// Pixels along each side of a depth map.
-const MAP: usize = 320;
+/// Pixels along each side of a depth map: the shadow of the lamp is sharper than that of the sky.
+const LAMP_MAP: usize = 320;
+const SKY_MAP: usize = 200;
 /// How far from the surface light is looked for, and how deep a shadow begins, in pixels of a depth map.
 const LIFT: f64 = 2.0;
 const BIAS: f64 = 1.0;
@@ -45,31 +46,28 @@ pub(super) struct Receivers<'a> {
 
 /// Size of the details of shadows of these points, in m.
 pub(super) fn resolution(points: &[Vector3<f64>]) -> f64 {
-    DepthMap::over(points).pixel
+    DepthMap::over(points, LAMP_MAP).pixel
 }
 
-/// The seen parts of the lamp and of the surroundings, from 0 to 1: for each vertex, on its front and on its back.
-pub(super) struct Visibility {
-    pub lamp: Vec<[f32; 2]>,
-    pub sky: Vec<[f32; 2]>,
+/// Returns the seen part of the lamp, from 0 to 1: for each vertex, on its front and on its back.
+pub(super) fn seen_lamp(occluders: &Occluders<'_>, receivers: &Receivers<'_>, lamp: Vector3<f64>) -> Vec<[f32; 2]> {
+    seen_parts(occluders, receivers, &lamp_directions(lamp, LAMP_DIRECTIONS), LAMP_MAP)
 }
 
-impl Visibility {
-    /// Computes the visibility of the vertices of a surface.
-    pub(super) fn of(occluders: &Occluders<'_>, receivers: &Receivers<'_>, lamp: Vector3<f64>) -> Self {
-        let [lamp, sky] = [lamp_directions(lamp, LAMP_DIRECTIONS), sphere()].map(|directions| {
-            let mut parts = seen_parts(occluders, receivers, &directions);
-            (0..SMOOTHINGS).for_each(|_| smooth(&mut parts, receivers.triangles));
-            parts
-        });
-        Self { lamp, sky }
-    }
+/// Returns the seen part of the surroundings.
+pub(super) fn seen_sky(occluders: &Occluders<'_>, receivers: &Receivers<'_>) -> Vec<[f32; 2]> {
+    seen_parts(occluders, receivers, &sphere(), SKY_MAP)
 }
 
 /// Returns the part of the directions that each vertex sees, weighted by the cosine with its normal.
-fn seen_parts(occluders: &Occluders<'_>, receivers: &Receivers<'_>, directions: &[Vector3<f64>]) -> Vec<[f32; 2]> {
+fn seen_parts(
+    occluders: &Occluders<'_>,
+    receivers: &Receivers<'_>,
+    directions: &[Vector3<f64>],
+    size: usize,
+) -> Vec<[f32; 2]> {
     let mut sums = vec![[[0.0_f64; 2]; 2]; receivers.points.len()];
-    let mut map = DepthMap::over(occluders.points);
+    let mut map = DepthMap::over(occluders.points, size);
     for &direction in directions {
         map.draw(occluders, direction);
         for (vertex, sums) in sums.iter_mut().enumerate() {
@@ -86,7 +84,9 @@ fn seen_parts(occluders: &Occluders<'_>, receivers: &Receivers<'_>, directions: 
         }
     }
     let part = |[seen, all]: [f64; 2]| if all > 0.0 { (seen / all) as f32 } else { 1.0 };
-    sums.into_iter().map(|sides| sides.map(part)).collect()
+    let mut parts: Vec<[f32; 2]> = sums.into_iter().map(|sides| sides.map(part)).collect();
+    (0..SMOOTHINGS).for_each(|_| smooth(&mut parts, receivers.triangles));
+    parts
 }
 
 /// Moves each value half-way to the mean of its neighbours, which removes the steps between the directions.
@@ -140,6 +140,8 @@ fn across(direction: Vector3<f64>) -> [Vector3<f64>; 2] {
 
 /// The parts nearest to a distant light, seen along a direction.
 struct DepthMap {
+    /// Pixels along each side.
+    size: usize,
     centre: Vector3<f64>,
     radius: f64,
     /// Size of a pixel, in m.
@@ -151,12 +153,12 @@ struct DepthMap {
 }
 
 impl DepthMap {
-    fn over(points: &[Vector3<f64>]) -> Self {
+    fn over(points: &[Vector3<f64>], size: usize) -> Self {
         let bounds = Bounds::of(points);
         let centre = [0, 1, 2].map(|axis| bounds.middle(axis));
         let radius = points.iter().map(|p| norm(subtract(*p, centre))).fold(f64::MIN_POSITIVE, f64::max);
-        let pixel = 2.0 * radius / (MAP - 4) as f64;
-        Self { centre, radius, pixel, axes: [[0.0; 3]; 3], nearest: vec![f32::NEG_INFINITY; MAP * MAP] }
+        let pixel = 2.0 * radius / (size - 4) as f64;
+        Self { centre, radius, pixel, axes: [[0.0; 3]; 3], size, nearest: vec![f32::NEG_INFINITY; size * size] }
     }
 
     fn draw(&mut self, occluders: &Occluders<'_>, direction: Vector3<f64>) {
@@ -176,15 +178,15 @@ impl DepthMap {
     }
 
     fn mark(&mut self, column: usize, row: usize, near: f64) {
-        if column < MAP && row < MAP {
-            let nearest = &mut self.nearest[MAP * row + column];
+        if column < self.size && row < self.size {
+            let nearest = &mut self.nearest[self.size * row + column];
             *nearest = nearest.max(near as f32);
         }
     }
 
     fn triangle(&mut self, corners: [[f64; 3]; 3]) {
         let nearest = &mut self.nearest;
-        for_each_pixel(corners.map(|[x, y, _]| [x, y]), [MAP; 2], |pixel, parts| {
+        for_each_pixel(corners.map(|[x, y, _]| [x, y]), [self.size; 2], |pixel, parts| {
             let near = parts[0] * corners[0][2] + parts[1] * corners[1][2] + parts[2] * corners[2][2];
             nearest[pixel] = nearest[pixel].max(near as f32);
         });
@@ -201,15 +203,15 @@ impl DepthMap {
 
     /// Returns the part of the light that the pixels around a place let through.
     fn seen(&self, [x, y, near]: [f64; 3]) -> f64 {
-        let [x, y] = [x, y].map(|coordinate| (coordinate - 0.5).clamp(0.0, (MAP - 2) as f64));
+        let [x, y] = [x, y].map(|coordinate| (coordinate - 0.5).clamp(0.0, (self.size - 2) as f64));
         let (column, row) = (x as usize, y as usize);
         let [right, down] = [x - column as f64, y - row as f64];
         let limit = near + BIAS * self.pixel;
         let scale = 1.0 / (RAMP * self.pixel);
         let open = |at: usize| (1.0 - (f64::from(self.nearest[at]) - limit) * scale).clamp(0.0, 1.0);
         let across = |at: usize| open(at) * (1.0 - right) + open(at + 1) * right;
-        let first = MAP * row + column;
-        across(first) * (1.0 - down) + across(first + MAP) * down
+        let first = self.size * row + column;
+        across(first) * (1.0 - down) + across(first + self.size) * down
     }
 }
 
