@@ -66,13 +66,13 @@ impl Canvas {
     }
 }
 
+/// Barycentric weights from which on a point lies in a triangle: the tiny overlap leaves no gap between neighbours,
+/// in spite of rounding.
+const INSIDE: f64 = -1e-9;
+
 /// Calls a function with each pixel whose centre lies in a triangle, and the barycentric weights of the corners.
 /// Pixels are numbered row by row.
-pub(super) fn for_each_pixel(
-    [a, b, c]: [[f64; 2]; 3],
-    size: [usize; 2],
-    mut visit: impl FnMut(usize, [f64; 3]),
-) {
+pub(super) fn for_each_pixel([a, b, c]: [[f64; 2]; 3], size: [usize; 2], mut visit: impl FnMut(usize, [f64; 3])) {
     let area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
     if !area.is_normal() {
         return;
@@ -82,27 +82,40 @@ pub(super) fn for_each_pixel(
         ((low - 0.5).max(0.0) as usize, ((high + 0.5).max(0.0) as usize).min(size[axis]))
     };
     let (columns, rows) = (range(0), range(1));
+    if columns.0 >= columns.1 {
+        return;
+    }
     let part = 1.0 / area;
-    // The weights of the second and third corner, and their changes per column.
-    let steps = [(c[1] - a[1]) * part, (a[1] - b[1]) * part];
+    // The changes of the weights per column.
+    let [second, third] = [(c[1] - a[1]) * part, (a[1] - b[1]) * part];
+    let steps = [-second - third, second, third];
+    let inverses = steps.map(|step| 1.0 / step);
     for row in rows.0..rows.1 {
         let [x, y] = [columns.0 as f64 + 0.5 - a[0], row as f64 + 0.5 - a[1]];
-        let starts = [
-            (x * (c[1] - a[1]) - y * (c[0] - a[0])) * part,
-            (y * (b[0] - a[0]) - x * (b[1] - a[1])) * part,
-        ];
-        let mut is_inside = false;
-        for column in columns.0..columns.1 {
-            let offset = (column - columns.0) as f64;
-            let [second, third] = [starts[0] + offset * steps[0], starts[1] + offset * steps[1]];
-            let first = 1.0 - second - third;
-            // A tiny overlap: rounding leaves no gap between neighbours.
-            if first >= -1e-9 && second >= -1e-9 && third >= -1e-9 {
-                is_inside = true;
-                visit(row * size[0] + column, [first, second, third]);
-            } else if is_inside {
-                break;
-            }
+        let second = (x * (c[1] - a[1]) - y * (c[0] - a[0])) * part;
+        let third = (y * (b[0] - a[0]) - x * (b[1] - a[1])) * part;
+        let starts = [1.0 - second - third, second, third];
+        let (from, to) = inside(starts, steps, inverses, columns.1 - columns.0);
+        for column in from..to {
+            let weights = [0, 1, 2].map(|corner| starts[corner] + column as f64 * steps[corner]);
+            visit(row * size[0] + columns.0 + column, weights);
         }
     }
+}
+
+/// Returns the range of the columns, below a number of them, where all weights say that the point lies inside.
+fn inside(starts: [f64; 3], steps: [f64; 3], inverses: [f64; 3], count: usize) -> (usize, usize) {
+    let (mut from, mut to) = (0.0, (count - 1) as f64);
+    for corner in 0..3 {
+        let bound = (INSIDE - starts[corner]) * inverses[corner];
+        if steps[corner] > 0.0 {
+            from = if bound > from { bound } else { from };
+        } else if steps[corner] < 0.0 {
+            to = if bound < to { bound } else { to };
+        } else if starts[corner] < INSIDE {
+            return (0, 0);
+        }
+    }
+    let first = from as usize;
+    (first + usize::from((first as f64) < from), if to < 0.0 { 0 } else { to as usize + 1 })
 }

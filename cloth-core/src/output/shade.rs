@@ -20,10 +20,10 @@ pub(super) fn lit(colour: [f32; 3]) -> Colours {
     [colour.map(|channel| 0.35 * channel), colour]
 }
 
-/// Returns the colours of the two sides of cloth of a colour; the back is paler.
+/// Returns the colours of the two sides of cloth of a colour; the back is paler, also in the dark.
 pub(super) fn sides(colour: [f32; 3]) -> [Colours; 2] {
-    let pale = colour.map(|channel| 0.6 * channel + 0.3);
-    [colour, pale].map(|colour| [colour.map(|channel| 0.2 * channel), colour])
+    let pale = colour.map(|channel| 0.5 * channel + 0.42);
+    [(colour, 0.2), (pale, 0.42)].map(|(colour, dark)| [colour.map(|channel| dark * channel), colour])
 }
 
 pub(super) fn mixed([dark, bright]: &Colours, brightness: f64) -> [f32; 3] {

@@ -11,7 +11,7 @@ use super::style::{OVERSAMPLING, garment_colour};
 use super::visibility::{Occluders, Receivers, resolution, seen_lamp, seen_sky};
 use crate::geometry::{cross, dot, norm, subtract};
 
-const SOLID: Colours = [[0.16, 0.15, 0.14], [0.86, 0.83, 0.78]];
+const SOLID: Colours = [[0.30, 0.29, 0.28], [0.86, 0.84, 0.80]];
 const EDGE: [f32; 3] = [0.08, 0.09, 0.11];
 /// Line width of edges, and of the rim of cloth, in pixels before downsampling.
 const LINE: f64 = 1.5 * OVERSAMPLING as f64;
@@ -32,7 +32,7 @@ const BEFORE: f64 = 0.9995;
 const EDGE_ON: f64 = 0.4;
 
 /// Size of the triangles that cast shadows, in pixels of a depth map.
-const CASTING: f64 = 6.0;
+const CASTING: f64 = 12.0;
 
 /// Cloth and solids; the vertices and segments of cloth come first.
 pub(super) struct Surfaces {
