@@ -7,6 +7,9 @@ use crate::geometry::{add_scaled, cross, dot, norm, subtract};
 /// A polyline of sharp edges that turns by more than this has a corner: cosine of 70°.
 const CORNER: f64 = 0.342;
 
+/// The edges at a vertex are of similar length up to this ratio.
+pub(super) const SIMILAR: f64 = 4.0;
+
 /// An edge of a triangle: its vertices in ascending order, and the triangle with the index of the edge's first corner.
 pub(super) type Side = ([usize; 2], usize, usize);
 
@@ -16,6 +19,8 @@ pub(super) struct Creased {
     pub originals: Vec<usize>,
     pub triangles: Vec<[usize; 3]>,
     pub normals: Vec<Vector3<f64>>,
+    /// The shortest edge at each vertex, in m.
+    pub shortest: Vec<f64>,
     /// For each triangle and each edge, which starts at the corner of that index.
     pub edges: Vec<[Edge; 3]>,
     /// Unit tangent of the curve of sharp edges at each original vertex; zero where there is none, or a corner.
@@ -58,8 +63,8 @@ impl Creased {
             }
         }
         let (originals, split) = fans.numbered(triangles);
-        let normals = normals(points, triangles, &split, originals.len());
-        Self { originals, triangles: split, normals, edges, tangents: tangents(points, &sharp) }
+        let (normals, shortest) = normals(points, triangles, &split, originals.len());
+        Self { originals, triangles: split, normals, shortest, edges, tangents: tangents(points, &sharp) }
     }
 }
 
@@ -133,23 +138,38 @@ impl Fans {
     }
 }
 
-/// Returns unit normals with the weights of Max (1999), which are exact on spheres: n = Σ a × b/(‖a‖² ‖b‖²) over the
-/// triangles with edges a and b at the vertex.
-fn normals(points: &[Vector3<f64>], originals: &[[usize; 3]], split: &[[usize; 3]], count: usize) -> Vec<Vector3<f64>> {
-    let mut sums = vec![[0.0; 3]; count];
+/// Returns unit normals, and the length of the shortest edge at each vertex. Where edges are of similar length, the
+/// weights are those of Max (1999), which are exact on spheres: n = Σ a × b/(‖a‖² ‖b‖²) over the triangles with edges a
+/// and b at the vertex. Elsewhere they are areas, so that large flat triangles beside those of a rounded edge look flat.
+fn normals(
+    points: &[Vector3<f64>],
+    originals: &[[usize; 3]],
+    split: &[[usize; 3]],
+    count: usize,
+) -> (Vec<Vector3<f64>>, Vec<f64>) {
+    let mut sums = vec![([0.0; 3], [0.0; 3]); count];
+    let mut lengths = vec![(f64::INFINITY, 0.0_f64); count];
     for (corners, numbers) in originals.iter().zip(split) {
         let places = corners.map(|corner| points[corner]);
         for corner in 0..3 {
             let [a, b] = [1, 2].map(|step| subtract(places[(corner + step) % 3], places[corner]));
-            let weight = 1.0 / (dot(a, a) * dot(b, b));
-            let sum = add_scaled(sums[numbers[corner]], weight, cross(a, b));
-            if sum.iter().all(|component| component.is_finite()) {
-                sums[numbers[corner]] = sum;
+            let (normal, [a, b]) = (cross(a, b), [a, b].map(norm));
+            let (exact, by_area) = &mut sums[numbers[corner]];
+            if (a * b).is_normal() {
+                *exact = add_scaled(*exact, 1.0 / (a * a * b * b), normal);
+                *by_area = add_scaled(*by_area, 1.0, normal);
             }
+            let (shortest, longest) = &mut lengths[numbers[corner]];
+            (*shortest, *longest) = (shortest.min(a).min(b), longest.max(a).max(b));
         }
     }
-    // The normals of folded triangles may cancel; any unit vector is good enough for shading.
-    sums.into_iter().map(|sum| if sum == [0.0; 3] { [0.0, 0.0, 1.0] } else { unit_or_zero(sum) }).collect()
+    let normal = |((exact, by_area), (shortest, longest)): (_, &(f64, f64))| {
+        let normal = unit_or_zero(if *longest < SIMILAR * shortest { exact } else { by_area });
+        // The normals of folded triangles may cancel; any unit vector is good enough for shading.
+        if normal == [0.0; 3] { [0.0, 0.0, 1.0] } else { normal }
+    };
+    let normals = sums.into_iter().zip(&lengths).map(normal).collect();
+    (normals, lengths.into_iter().map(|(shortest, _)| shortest).collect())
 }
 
 /// The curve of sharp edges at a vertex.

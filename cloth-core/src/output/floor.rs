@@ -53,5 +53,44 @@ fn covered(at: f64, extent: f64, spacing: f64) -> f64 {
 /// Returns 1, 2 or 5 times a power of ten, at most the given length.
 fn round_length(length: f64) -> f64 {
     let power = 10.0_f64.powf(length.log10().floor());
-    power * if length >= 5.0 * power { 5.0 } else if length >= 2.0 * power { 2.0 } else { 1.0 }
+    power
+        * if length >= 5.0 * power {
+            5.0
+        } else if length >= 2.0 * power {
+            2.0
+        } else {
+            1.0
+        }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rows_show_the_points_of_the_floor_that_the_camera_projects_there() {
+        let camera = Camera::looking([1.0, -2.0, 1.5], [0.2, 0.1, 0.3], 40.0, [800.0, 600.0]);
+        for point in [[0.0, 0.0, -0.2], [0.5, 0.3, -0.2], [-1.0, 2.0, -0.2]] {
+            let ([x, y], _) = camera.project(point);
+            let row = camera.floor_row(y, -0.2, 800.0).unwrap();
+            for axis in 0..2 {
+                let found = row.start[axis] + x * row.step[axis];
+                assert!((found - point[axis]).abs() < 1e-12, "{found} instead of {}", point[axis]);
+            }
+        }
+        // Above the horizon, and from below.
+        assert!(camera.floor_row(-1e4, -0.2, 800.0).is_none());
+        assert!(camera.floor_row(500.0, 1.6, 800.0).is_none());
+    }
+
+    #[test]
+    fn lines_cover_their_part_of_pixels_however_small_they_are() {
+        let spacing = 0.2;
+        for (pixels, start) in [(4000, -1.03), (97, 0.31)] {
+            let extent = 5.0 * spacing / f64::from(pixels);
+            let sum: f64 = (0..pixels).map(|at| covered(start + (f64::from(at) + 0.5) * extent, extent, spacing)).sum();
+            assert!((sum / f64::from(pixels) / WIDTH - 1.0).abs() < 1e-9, "{sum}");
+        }
+        assert_eq!([0.09, 0.1, 0.34, 7.9].map(round_length), [0.05, 0.1, 0.2, 5.0]);
+    }
 }

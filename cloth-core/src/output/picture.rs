@@ -204,3 +204,66 @@ fn cover(picture: &mut Pixmap, canvas: &Pixmap) {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::shade::sides;
+    use super::*;
+
+    /// Draws a level square with a side of 1 m at a height, seen from the right, and returns the picture with its
+    /// camera.
+    fn square_above_the_floor(height: f64) -> (Pixmap, Camera) {
+        let at = |step: usize| step as f64 / 10.0 - 0.5;
+        let positions: Vec<Vector3<f64>> = (0..121).map(|n| [at(n % 11), at(n / 11), height]).collect();
+        let cells = (0..110).filter(|n| n % 11 != 10);
+        let triangles: Vec<[usize; 3]> = cells.flat_map(|a| [[a, a + 1, a + 12], [a, a + 12, a + 11]]).collect();
+        let camera = Camera::looking([3.0, 0.3, 4.0], [0.5, 0.3, 0.3], 30.0, [2400.0, 1800.0]);
+        let view = View {
+            positions: &positions,
+            triangles: &triangles,
+            strands: &[],
+            widths: &[],
+            garment_colours: &[],
+            solids: &[],
+            floor: Some(0.0),
+            camera: Some(camera),
+            look: Look::default(),
+            style: Style { size: [1200, 900], background: Some([1.0; 3]), ..Style::default() },
+        };
+        (Pixmap::decode_png(&picture_png(&view).unwrap()).unwrap(), camera)
+    }
+
+    fn green(picture: &Pixmap, camera: &Camera, point: Vector3<f64>) -> i32 {
+        let ([x, y], _) = camera.project(point);
+        i32::from(picture.pixel(x as u32 / OVERSAMPLING, y as u32 / OVERSAMPLING).unwrap().green())
+    }
+
+    #[test]
+    fn the_border_of_a_shadow_has_no_steps() {
+        let (picture, camera) = square_above_the_floor(1.0);
+        // Across the border of the shadow in x, which is blurred over 0.2 m. The picture has 2 mm per pixel, and
+        // the floor a line every 0.2 m.
+        let middle = shadow_of(&[0.0, 0.25, 1.0], 0.0);
+        let along = (0..300).map(|step| middle[0] + 0.3 + 0.4 * f64::from(step) / 300.0);
+        let beside_lines = along.filter(|x| (x / 0.2 - (x / 0.2).round()).abs() > 0.04);
+        let tones: Vec<i32> = beside_lines.map(|x| green(&picture, &camera, [x, middle[1], 0.0])).collect();
+        let (dark, bright) = (tones[0], tones[tones.len() - 1]);
+        assert!(bright > dark + 50, "{tones:?}");
+        let between: std::collections::BTreeSet<i32> = tones.iter().copied().collect();
+        assert!(between.len() > 40, "{between:?}");
+        let largest = tones.windows(2).map(|pair| (pair[1] - pair[0]).abs()).max().unwrap();
+        assert!(largest <= 5, "a step of {largest}: {tones:?}");
+    }
+
+    #[test]
+    fn cloth_has_a_rim_and_a_paler_back_and_stands_on_a_floor() {
+        let (picture, camera) = square_above_the_floor(0.5);
+        let inside = green(&picture, &camera, [0.2, -0.2, 0.5]);
+        let rim = green(&picture, &camera, [0.2, -0.5, 0.5]);
+        assert!(rim > inside + 5, "{rim} beside {inside}");
+        let floor = green(&picture, &camera, [0.93, -0.83, 0.0]);
+        assert!(floor < 250 && floor > 200, "{floor}");
+        let [front, back] = sides([0.4, 0.6, 0.8]);
+        assert!((0..2).all(|light| back[light][1] > front[light][1] + 0.1));
+    }
+}

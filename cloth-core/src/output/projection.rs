@@ -91,9 +91,8 @@ impl Camera {
             return None;
         }
         let step = [pixel * right[0], pixel * right[1]];
-        let start = [0, 1].map(|axis| {
-            self.eye[axis] + depth * (forward[axis] + offset * down[axis]) - self.centre[0] * step[axis]
-        });
+        let start = [0, 1]
+            .map(|axis| self.eye[axis] + depth * (forward[axis] + offset * down[axis]) - self.centre[0] * step[axis]);
         Some(FloorRow { start, step, pixel })
     }
 

@@ -119,3 +119,38 @@ fn inside(starts: [f64; 3], steps: [f64; 3], inverses: [f64; 3], count: usize) -
     let first = from as usize;
     (first + usize::from((first as f64) < from), if to < 0.0 { 0 } else { to as usize + 1 })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn triangles_cover_the_pixels_inside_once_with_the_weights_of_their_corners() {
+        // Two triangles of a quadrilateral, whose common edge passes between pixels, reach beyond the picture.
+        let corners = [[-3.3, 2.1], [17.9, -4.2], [23.4, 15.7], [4.1, 19.2]];
+        let size = [20, 16];
+        let mut covered = vec![0; size[0] * size[1]];
+        for triangle in [[0, 1, 2], [0, 2, 3]].map(|numbers| numbers.map(|number: usize| corners[number])) {
+            for_each_pixel(triangle, size, |pixel, weights| {
+                covered[pixel] += 1;
+                let centre = [(pixel % size[0]) as f64 + 0.5, (pixel / size[0]) as f64 + 0.5];
+                for axis in 0..2 {
+                    let mean: f64 = (0..3).map(|corner| weights[corner] * triangle[corner][axis]).sum();
+                    assert!((mean - centre[axis]).abs() < 1e-9, "{pixel}: {weights:?}");
+                }
+            });
+        }
+        for (pixel, count) in covered.into_iter().enumerate() {
+            let [x, y] = [(pixel % size[0]) as f64 + 0.5, (pixel / size[0]) as f64 + 0.5];
+            let is_inside = (0..4).all(|from| {
+                let ([a, b], [c, d]) = (corners[from], corners[(from + 1) % 4]);
+                (c - a) * (y - b) - (d - b) * (x - a) > 0.0
+            });
+            assert_eq!(count, i32::from(is_inside), "{x}, {y}");
+        }
+        // Flat and invalid ones cover nothing.
+        for flat in [[[0.0; 2], [5.0; 2], [9.0; 2]], [[f64::NAN; 2], [5.0, 1.0], [9.0, 8.0]]] {
+            for_each_pixel(flat, size, |pixel, _| panic!("{pixel}"));
+        }
+    }
+}

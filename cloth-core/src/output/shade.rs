@@ -32,12 +32,7 @@ pub(super) fn mixed([dark, bright]: &Colours, brightness: f64) -> [f32; 3] {
 
 /// Returns the brightness from the lamp, a weaker light at the eye, the sky and the floor below, and a sheen at grazing
 /// angles. The last argument holds the visible parts of the lamp and of the surroundings.
-pub(super) fn shade(
-    normal: Vector3<f64>,
-    lamp: Vector3<f64>,
-    eye: Vector3<f64>,
-    [sunlit, open]: [f64; 2],
-) -> f64 {
+pub(super) fn shade(normal: Vector3<f64>, lamp: Vector3<f64>, eye: Vector3<f64>, [sunlit, open]: [f64; 2]) -> f64 {
     let facing = dot(normal, eye).clamp(0.0, 1.0);
     let grazing = (1.0 - facing) * (1.0 - facing) * (1.0 - facing);
     let around = 0.10 + 0.20 * facing * facing + 0.14 * (0.5 + 0.5 * normal[2]) + 0.16 * grazing;

@@ -89,9 +89,7 @@ impl<'a> Show<'a> {
         for (number, part) in self.simulation.parts().iter().enumerate() {
             let frames = self.frames.iter().map(|frame| &frame[part.vertices.clone()]).collect();
             let (joined, colour, width) = match part.kind {
-                PartKind::Cloth(_) => {
-                    (Joined::Triangles(&self.triangles[number]), linear(garment_colour(number)), 0.0)
-                }
+                PartKind::Cloth(_) => (Joined::Triangles(&self.triangles[number]), linear(garment_colour(number)), 0.0),
                 PartKind::Hair { width, .. } => (Joined::Strands(&self.strands[number]), HAIR, width),
             };
             let colour = part.colour.map_or(colour, linear);

@@ -53,12 +53,7 @@ impl Subdivided {
 
 /// Returns the vertices averaged with their neighbours, each of which has this weight: a function of their number, and
 /// for the two neighbours on a border a number.
-fn averaged(
-    points: &[Vector3<f64>],
-    sides: &[Side],
-    weight: impl Fn(f64) -> f64,
-    on_border: f64,
-) -> Vec<Vector3<f64>> {
+fn averaged(points: &[Vector3<f64>], sides: &[Side], weight: impl Fn(f64) -> f64, on_border: f64) -> Vec<Vector3<f64>> {
     let mut sums = vec![([0.0; 3], 0.0); points.len()];
     let mut sharp = Vec::new();
     for group in sides.chunk_by(|a, b| a.0 == b.0) {

@@ -76,7 +76,8 @@ impl Surfaces {
     pub(super) fn draw(&self, canvas: &mut Canvas, camera: &Camera, view: &View<'_>) {
         let fine = &self.fine;
         let lamp = towards_lamp();
-        let facing = fine.points.iter().zip(&fine.normals).map(|(point, normal)| dot(*normal, camera.towards_eye(*point)));
+        let facing =
+            fine.points.iter().zip(&fine.normals).map(|(point, normal)| dot(*normal, camera.towards_eye(*point)));
         let wanted: Vec<[bool; 2]> = facing.map(|cosine| [cosine > -EDGE_ON, cosine < EDGE_ON]).collect();
         let casting = Self::casting(view, &fine.points);
         let (points, segments) = casting.with_hair(view);
@@ -153,7 +154,8 @@ impl Surfaces {
                 return [SOLID; 2];
             }
             let [one, other] = corner.parents.map(of_vertex);
-            let mean = |side: usize, light: usize| [0, 1, 2].map(|i| 0.5 * (one[side][light][i] + other[side][light][i]));
+            let mean =
+                |side: usize, light: usize| [0, 1, 2].map(|i| 0.5 * (one[side][light][i] + other[side][light][i]));
             [0, 1].map(|side| [0, 1].map(|light| mean(side, light)))
         };
         self.fine.corners.iter().map(of_corner).collect()
@@ -164,7 +166,8 @@ impl Surfaces {
         let drawn = |segment: &&Segment| if wireframe { segment.is_edge } else { segment.is_border };
         for Segment { ends, .. } in self.fine.segments[..self.cloth_segments].iter().filter(drawn) {
             let [from, to] = ends.map(|vertex| {
-                let side = usize::from(dot(self.fine.normals[vertex], camera.towards_eye(self.fine.points[vertex])) < 0.0);
+                let side =
+                    usize::from(dot(self.fine.normals[vertex], camera.towards_eye(self.fine.points[vertex])) < 0.0);
                 let Corner { place, depth, colour } = corners[vertex][side];
                 let colour = if wireframe { EDGE } else { colour.map(|channel| channel + RIM_LIGHT * (1.0 - channel)) };
                 Corner { place, depth: BEFORE * depth, colour }

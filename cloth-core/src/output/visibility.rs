@@ -238,17 +238,24 @@ mod tests {
         grid(0.2, &mut points, &mut triangles, 0.4);
         let normals = vertex_normals(&points, &triangles);
         let occluders = Occluders { points: &points, triangles: &triangles, segments: &[] };
-        let Visibility { lamp, sky } = Visibility::of(&occluders, &normals, &[[true; 2]; 882], [0.0, 0.0, 1.0]);
+        let wanted = vec![[true; 2]; 882];
+        let receivers = Receivers { points: &points, normals: &normals, triangles: &triangles, wanted: &wanted };
+        let above = [0.0, 0.0, 1.0];
+        let (lamp, sky) = (seen_lamp(&occluders, &receivers, above), seen_sky(&occluders, &receivers));
         let (middle, corner, cover) = (220, 0, 441 + 220);
         assert!(lamp[middle][0] < 0.01 && lamp[corner][0] > 0.99 && lamp[cover][0] > 0.99);
         assert!(sky[middle][0] < 0.4 && sky[corner][0] > 0.9 && sky[cover][0] > 0.9, "{:?}", sky[middle]);
         // The underside of the cover faces the sheet; that of the sheet is free.
         assert!(sky[cover][1] < 0.5 && sky[middle][1] > 0.9);
+        // The shadow begins gradually.
+        let row: Vec<f32> = (0..=10).map(|step| lamp[middle + step][0]).collect();
+        assert!(row.is_sorted() && row.windows(2).all(|pair| pair[1] - pair[0] < 0.5), "{row:?}");
         // Hair casts shadows, too.
         let hair = [[-1.0, 0.0, 0.3], [1.0, 0.0, 0.3]];
-        let points: Vec<_> = points[..441].iter().copied().chain(hair).collect();
-        let occluders = Occluders { points: &points, triangles: &triangles[..800], segments: &[[441, 442]] };
-        let Visibility { lamp, .. } = Visibility::of(&occluders, &normals[..441], [0.0, 0.0, 1.0]);
-        assert!(lamp[middle][0] < 0.9 && lamp[middle + 3 * 21][0] > 0.99, "{:?}", lamp[middle]);
+        let with_hair: Vec<_> = points[..441].iter().copied().chain(hair).collect();
+        let occluders = Occluders { points: &with_hair, triangles: &triangles[..800], segments: &[[441, 442]] };
+        let receivers = Receivers { points: &points[..441], triangles: &triangles[..800], ..receivers };
+        let lamp = seen_lamp(&occluders, &receivers, above);
+        assert!(lamp[middle][0] < 0.97 && lamp[middle + 6 * 21][0] > 0.99, "{:?}", lamp[middle]);
     }
 }
