@@ -5,6 +5,7 @@ mod crease;
 mod floor;
 mod floor_shadow;
 mod folder;
+mod patch;
 mod picture;
 mod ply;
 mod point_cache;
