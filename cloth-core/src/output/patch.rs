@@ -1,4 +1,4 @@
-//! A cubic patch per triangle (curved PN triangles, Vlachos et al. 2001), which follows the normals inside, and the curve
+//! A cubic patch per triangle (curved PN triangles, Vlachos et al. 2001). It follows the normals inside, and the curve
 //! of neighbouring edges along borders and creases.
 //!
 //! The curve of an edge depends on its ends only, so that patches meet without gaps.
