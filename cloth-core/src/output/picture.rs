@@ -19,8 +19,10 @@ use crate::scene::Style;
 const HAIR: Colours = [[0.10, 0.05, 0.03], [0.72, 0.46, 0.26]];
 /// The least width of hair, in pixels before downsampling.
 const THINNEST: f64 = 1.5;
-/// Parts of the lamp that cast a shadow on the floor: so many that their borders cannot be told apart.
-const LAMPS: usize = 48;
+/// Parts of the lamp that cast a shadow on the floor, so many that their borders cannot be told apart, and fewer where
+/// they would cast more triangles than this.
+const LAMPS: [usize; 2] = [24, 48];
+const MOST_SHADOWS: usize = 2_000_000;
 
 /// A picture that cannot be encoded.
 #[derive(Debug, thiserror::Error)]
@@ -176,7 +178,8 @@ fn draw_shadow(
         .flat_map(|(strand, width)| strand.clone().skip(1).map(|end| ([end - 1, end], *width)))
         .collect();
     let mut all = FloorShadow::new(view.style.size.map(|pixels| pixels * OVERSAMPLING));
-    for lamp in lamp_directions(towards_lamp(), LAMPS) {
+    let lamps = (MOST_SHADOWS / triangles.len().max(1)).clamp(LAMPS[0], LAMPS[1]);
+    for lamp in lamp_directions(towards_lamp(), lamps) {
         let shadow: Vec<Vector3<f64>> = points.iter().map(|p| shadow_along(p, floor, lamp)).collect();
         all.add(camera, &shadow, triangles, &segments);
     }

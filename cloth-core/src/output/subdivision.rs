@@ -67,15 +67,16 @@ fn averaged(points: &[Vector3<f64>], sides: &[Side], weight: impl Fn(f64) -> f64
         }
     }
     let curves = curves(points, &sharp);
-    let average = |((point, (sum, count)), curve): ((&Vector3<f64>, (Vector3<f64>, f64)), &Curve)| {
-        let (sum, count, weight) = match curve {
+    let average = |(vertex, point): (usize, &Vector3<f64>)| {
+        let (sum, count) = sums[vertex];
+        let (sum, count, weight) = match curves[vertex] {
             Curve::None if count > 2.0 => (sum, count, weight(count)),
-            Curve::Through([a, b]) => (add_scaled(points[*a], 1.0, points[*b]), 2.0, on_border),
+            Curve::Through([a, b]) => (add_scaled(points[a], 1.0, points[b]), 2.0, on_border),
             _ => return *point,
         };
         add_scaled(point.map(|component| (1.0 - weight * count) * component), weight, sum)
     };
-    points.iter().zip(sums).zip(&curves).map(average).collect()
+    points.iter().enumerate().map(average).collect()
 }
 
 /// Returns the weight of each of `count` neighbours of a vertex in a step.
