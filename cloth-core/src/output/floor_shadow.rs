@@ -4,12 +4,13 @@ use energy_dsl::Vector3;
 use tiny_skia::Pixmap;
 
 use super::projection::Camera;
+use super::raster::for_each_pixel;
 
 /// Colour of the shadow, and its opacity where no part of the lamp is seen.
 const INK: [f32; 3] = [0.1, 0.11, 0.14];
 const OPACITY: f32 = 0.34;
 /// Pixels of the picture per pixel of the shadow, along each side.
-const COARSENESS: u32 = 5;
+const COARSENESS: u32 = 4;
 
 /// The parts of the lamp that each pixel of the floor does not see, at low resolution.
 pub(super) struct FloorShadow {
@@ -23,9 +24,9 @@ pub(super) struct FloorShadow {
 }
 
 impl FloorShadow {
-    /// Starts without any part of the lamp, for a picture of this size.
-    pub(super) fn new(canvas: &Pixmap) -> Self {
-        let (width, height) = ((canvas.width() / COARSENESS) as usize, (canvas.height() / COARSENESS) as usize);
+    /// Starts without any part of the lamp, for a view of this size in pixels.
+    pub(super) fn new(size: [u32; 2]) -> Self {
+        let [width, height] = size.map(|side| side.div_ceil(COARSENESS) as usize + 1);
         let pixels = width * height;
         Self { width, height, hidden: vec![0; pixels], last: vec![0; pixels], parts: 0 }
     }
@@ -65,49 +66,32 @@ impl FloorShadow {
     }
 
     /// Hides the current part of the lamp from a triangle.
-    fn hide(&mut self, [a, b, c]: [[f64; 2]; 3]) {
-        let area = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
-        let range = |axis: usize, size: usize| {
-            let (low, high) = (a[axis].min(b[axis]).min(c[axis]), a[axis].max(b[axis]).max(c[axis]));
-            ((low - 0.5).ceil().max(0.0) as usize, ((high + 0.5).ceil().max(0.0) as usize).min(size))
-        };
-        if !area.is_normal() {
-            return;
-        }
-        let (columns, rows) = (range(0, self.width), range(1, self.height));
-        let weight = |p: [f64; 2], q: [f64; 2], at: [f64; 2]| {
-            ((q[0] - p[0]) * (at[1] - p[1]) - (q[1] - p[1]) * (at[0] - p[0])) / area
-        };
-        for row in rows.0..rows.1 {
-            for column in columns.0..columns.1 {
-                let pixel = self.width * row + column;
-                let at = [column as f64 + 0.5, row as f64 + 0.5];
-                let is_new = self.last[pixel] != self.parts;
-                if is_new && [(b, c), (c, a), (a, b)].into_iter().all(|(p, q)| weight(p, q, at) >= -1e-9) {
-                    self.last[pixel] = self.parts;
-                    self.hidden[pixel] += 1;
-                }
+    fn hide(&mut self, corners: [[f64; 2]; 3]) {
+        let (hidden, last, part) = (&mut self.hidden, &mut self.last, self.parts);
+        for_each_pixel(corners, [self.width, self.height], |pixel, _| {
+            if last[pixel] != part {
+                last[pixel] = part;
+                hidden[pixel] += 1;
             }
-        }
+        });
     }
 
-    /// Darkens a picture. Bilinear interpolation softens the pixels of the shadow.
-    pub(super) fn draw(&self, canvas: &mut Pixmap) {
+    /// Darkens a picture, of `scale` pixels of the view per pixel along each side.
+    pub(super) fn draw(&self, canvas: &mut Pixmap, scale: u32) {
         let width = canvas.width() as usize;
-        let at = |pixel: usize| (pixel as f32 + 0.5) / COARSENESS as f32 - 0.5;
+        let hidden = self.averaged();
+        let at = |pixel: usize| (pixel as f32 + 0.5) * scale as f32 / COARSENESS as f32 - 0.5;
+        let opacity = OPACITY / f32::from(self.parts.max(1));
         for (row, pixels) in canvas.data_mut().chunks_exact_mut(4 * width).enumerate() {
-            let Some((y, below)) = self.cell(at(row), self.height) else { continue };
-            let [upper, lower] = [y, y + 1].map(|row| &self.hidden[self.width * row..][..self.width]);
-            if upper.iter().chain(lower).all(|hidden| *hidden == 0) {
+            let Some((y, below)) = cell(at(row), self.height) else { continue };
+            let [upper, lower] = [y, y + 1].map(|row| &hidden[self.width * row..][..self.width]);
+            if upper.iter().chain(lower).all(|hidden| *hidden == 0.0) {
                 continue;
             }
             for (column, pixel) in pixels.chunks_exact_mut(4).enumerate() {
-                let Some((x, right)) = self.cell(at(column), self.width) else { continue };
-                let [above, under] = [upper, lower].map(|line| {
-                    let [near, far] = [line[x], line[x + 1]].map(f32::from);
-                    near + right * (far - near)
-                });
-                let alpha = OPACITY * (above + below * (under - above)) / f32::from(self.parts.max(1));
+                let Some((x, right)) = cell(at(column), self.width) else { continue };
+                let [above, under] = [upper, lower].map(|line| line[x] + right * (line[x + 1] - line[x]));
+                let alpha = opacity * (above + below * (under - above));
                 for (byte, ink) in pixel.iter_mut().zip(INK) {
                     *byte = (f32::from(*byte) * (1.0 - alpha) + 255.0 * alpha * ink + 0.5) as u8;
                 }
@@ -115,13 +99,26 @@ impl FloorShadow {
         }
     }
 
-    /// Returns the pixel of the shadow before a coordinate, and the part of the way to the next one; `None` if there is
-    /// no next one.
-    fn cell(&self, coordinate: f32, count: usize) -> Option<(usize, f32)> {
-        let coordinate = coordinate.max(0.0);
-        let before = coordinate as usize;
-        (before + 1 < count).then_some((before, coordinate - before as f32))
+    /// Averages neighbouring pixels, which removes their steps where the shadow is sharp.
+    fn averaged(&self) -> Vec<f32> {
+        let mut hidden: Vec<f32> = self.hidden.iter().map(|hidden| f32::from(*hidden)).collect();
+        for stride in [1, self.width] {
+            let before = hidden.clone();
+            let inner = stride..before.len().saturating_sub(stride);
+            for pixel in inner {
+                hidden[pixel] = 0.25 * (before[pixel - stride] + before[pixel + stride]) + 0.5 * before[pixel];
+            }
+        }
+        hidden
     }
+}
+
+/// Returns the pixel of the shadow before a coordinate, and the part of the way to the next one; `None` if there is
+/// no next one.
+fn cell(coordinate: f32, count: usize) -> Option<(usize, f32)> {
+    let coordinate = coordinate.max(0.0);
+    let before = coordinate as usize;
+    (before + 1 < count).then_some((before, coordinate - before as f32))
 }
 
 #[cfg(test)]
@@ -137,10 +134,10 @@ mod tests {
         let floor = [[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [1.0, 1.0, 0.0], [-1.0, 1.0, 0.0]];
         let style = Style { size: [250, 250], ..Style::default() };
         let camera = camera_on(&style, &floor);
-        let mut shadow = FloorShadow::new(&canvas);
+        let mut shadow = FloorShadow::new([500, 500]);
         shadow.add(&camera, &floor, &[[0, 1, 2], [0, 1, 2], [0, 2, 3]], &[]);
         shadow.add(&camera, &floor, &[[0, 1, 2]], &[]);
-        shadow.draw(&mut canvas);
+        shadow.draw(&mut canvas, 1);
         let brightness = |point: Vector3<f64>| {
             let ([x, y], _) = camera.project(point);
             canvas.pixel(x as u32, y as u32).unwrap().green()

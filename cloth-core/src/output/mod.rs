@@ -1,17 +1,24 @@
 //! Output files: frames (OBJ, PLY, PNG), animations (glTF, USD), pictures.
 
 mod animation;
+mod crease;
+mod floor;
 mod floor_shadow;
 mod folder;
+mod patch;
 mod picture;
 mod ply;
 mod point_cache;
 mod projection;
 mod raster;
 mod scenery;
+mod shade;
 mod show;
+mod smooth_surface;
 mod solid_mesh;
 mod style;
+mod subdivision;
+mod surfaces;
 mod track;
 mod usd;
 mod visibility;

@@ -3,35 +3,32 @@ use std::ops::Range;
 use energy_dsl::Vector3;
 use tiny_skia::Pixmap;
 
+use super::floor::draw_floor;
 use super::floor_shadow::FloorShadow;
 use super::projection::Camera;
 use super::raster::{Canvas, Corner};
+use super::shade::{Colours, LAMP, lit, mixed, towards_lamp};
 use super::solid_mesh::SolidMesh;
 use super::style::{OVERSAMPLING, camera_on};
-use super::vertex_normals;
-use super::visibility::{Occluders, Visibility, lamp_directions};
-use crate::geometry::{cross, dot, norm, subtract};
+use super::surfaces::Surfaces;
+use super::visibility::lamp_directions;
+use crate::geometry::{dot, norm, subtract};
 use crate::scene::Style;
 
-/// Dark and bright colours of solids and of hair.
-const SOLID: Colours = [[0.16, 0.15, 0.14], [0.86, 0.83, 0.78]];
+/// Dark and bright colours of hair.
 const HAIR: Colours = [[0.10, 0.05, 0.03], [0.72, 0.46, 0.26]];
-const EDGE: [f32; 3] = [0.08, 0.09, 0.11];
-/// Line width of edges, and the least of hair, in pixels before downsampling.
-const LINE: f64 = 3.0;
+/// The least width of hair, in pixels before downsampling.
 const THINNEST: f64 = 1.5;
+/// Parts of the lamp that cast a shadow on the floor, so many that their borders cannot be told apart, and fewer where
+/// they would cast more triangles than this.
+const LAMPS: [usize; 2] = [24, 48];
+const MOST_SHADOWS: usize = 2_000_000;
 
 /// A picture that cannot be encoded.
 #[derive(Debug, thiserror::Error)]
 #[error("cannot draw the picture: {0}")]
 #[non_exhaustive]
 pub struct PictureError(String);
-
-/// Direction from the cloth to the lamp.
-const LAMP: Vector3<f64> = [-0.25, -0.45, 1.0];
-/// Dark and bright colours of the front and of the back.
-const FRONT: Colours = [[0.03, 0.10, 0.19], [0.40, 0.66, 0.86]];
-const BACK: Colours = [[0.20, 0.08, 0.05], [0.94, 0.66, 0.46]];
 
 /// The contents of a picture.
 #[derive(Clone, Copy, Debug)]
@@ -44,7 +41,7 @@ pub struct View<'a> {
     pub strands: &'a [Range<usize>],
     /// Width of each strand, in m.
     pub widths: &'a [f64],
-    /// RGB colour of each vertex of garments with a colour of their own; empty if none has one.
+    /// RGB colour of each vertex of garments with a colour of their own; may be empty.
     pub garment_colours: &'a [Option<[f32; 3]>],
     /// Surfaces of the solids.
     pub solids: &'a [SolidMesh],
@@ -67,14 +64,18 @@ pub struct Look<'a> {
     pub wireframe: bool,
 }
 
-/// Draws cloth, hair and solids as PNG. The two sides of cloth have different colours; cloth, solids and the floor
+/// Draws cloth, hair and solids as PNG, on a floor. Surfaces are smooth: patches follow the vertices and their normals.
+/// Garments have colours of their own, paler on the back, and a rim along their borders. Cloth, solids and the floor
 /// receive soft shadows. z is up.
 ///
 /// # Errors
 /// Returns an error if the picture cannot be encoded.
 pub fn picture_png(view: &View<'_>) -> Result<Vec<u8>, PictureError> {
+    let no_memory = || PictureError("no memory".into());
+    let [width, height] = view.style.size;
+    let mut picture = Pixmap::new(width, height).ok_or_else(no_memory)?;
     let [width, height] = view.style.size.map(|pixels| pixels * OVERSAMPLING);
-    let mut background = Pixmap::new(width, height).ok_or_else(|| PictureError("no memory".into()))?;
+    let mut canvas = Canvas::new(Pixmap::new(width, height).ok_or_else(no_memory)?);
     let solids = view.solids.iter().flat_map(|solid| &solid.vertices);
     let everything: Vec<Vector3<f64>> = view.positions.iter().chain(solids).copied().collect();
     let floor = floor_below(&everything, view.floor);
@@ -82,21 +83,20 @@ pub fn picture_png(view: &View<'_>) -> Result<Vec<u8>, PictureError> {
         let all: Vec<Vector3<f64>> = everything.iter().flat_map(|p| [*p, shadow_of(p, floor)]).collect();
         camera_on(&view.style, &all)
     });
-    draw_background(&mut background, view.style.background);
-    let triangles = all_triangles(view);
-    draw_shadow(&mut background, &camera, (&everything, floor), &triangles, view);
-    let mut canvas = Canvas::new(background);
-    draw_surfaces(&mut canvas, &camera, &everything, &triangles, view);
-    if view.look.wireframe {
-        draw_edges(&mut canvas, &camera, view.positions, view.triangles);
-    }
-    let own = |vertex: usize| view.look.colours.and_then(|colours| colours.get(vertex)).map(lit);
+    draw_background(&mut picture, view.style.background);
+    draw_floor(&mut picture, &camera, floor);
+    draw_shadow(&mut picture, &camera, (&everything, floor), &all_triangles(view), view);
+    Surfaces::shown(view, &camera).draw(&mut canvas, &camera, view);
+    let own = |vertex: usize| {
+        let shown = view.look.colours.and_then(|colours| colours.get(vertex));
+        shown.copied().or(view.garment_colours.get(vertex).copied().flatten()).map(lit)
+    };
     for (strand, width) in view.strands.iter().zip(view.widths) {
         let colours = |vertex| own(vertex).unwrap_or(HAIR);
         draw_strand(&mut canvas, &camera, view.positions, strand.clone(), *width, colours);
     }
-    let small = averaged(&canvas.pixels, view.style.size).ok_or_else(|| PictureError("no memory".into()))?;
-    small.encode_png().map_err(|error| PictureError(error.to_string()))
+    cover(&mut picture, &canvas.pixels);
+    picture.encode_png().map_err(|error| PictureError(error.to_string()))
 }
 
 /// Returns the triangles of cloth and solids in one vertex numbering.
@@ -110,50 +110,6 @@ fn all_triangles(view: &View<'_>) -> Vec<[usize; 3]> {
     all
 }
 
-type Colours = [[f32; 3]; 2];
-
-/// Draws cloth and solids, whose points and triangles share one numbering: those of cloth come first.
-fn draw_surfaces(
-    canvas: &mut Canvas,
-    camera: &Camera,
-    points: &[Vector3<f64>],
-    triangles: &[[usize; 3]],
-    view: &View<'_>,
-) {
-    let normals = vertex_normals(points, triangles);
-    let lamp = LAMP.map(|component| component / norm(LAMP));
-    let segments: Vec<[usize; 2]> = view
-        .strands
-        .iter()
-        .flat_map(|strand| strand.clone().zip(strand.clone().skip(1)).map(|(a, b)| [a, b]))
-        .collect();
-    let visibility = Visibility::of(&Occluders { points, triangles, segments: &segments }, &normals, lamp);
-    let colours = |vertex: usize, is_front: bool| {
-        if vertex >= view.positions.len() {
-            return SOLID;
-        }
-        let shown = view.look.colours.and_then(|colours| colours.get(vertex)).map(lit);
-        let own = view.garment_colours.get(vertex).copied().flatten();
-        shown.or(own.map(|colour| sides(&colour)[usize::from(!is_front)])).unwrap_or(if is_front {
-            FRONT
-        } else {
-            BACK
-        })
-    };
-    for corners in triangles {
-        let [a, b, c] = corners.map(|corner| points[corner]);
-        let is_front = dot(cross(subtract(b, a), subtract(c, a)), camera.towards_eye(a)) >= 0.0;
-        let (side, sign) = if is_front { (0, 1.0) } else { (1, -1.0) };
-        canvas.triangle(corners.map(|corner| {
-            let normal = normals[corner].map(|component| sign * component);
-            let (place, depth) = camera.project(points[corner]);
-            let seen = [visibility.lamp[corner][side], visibility.sky[corner][side]].map(f64::from);
-            let brightness = shade(normal, lamp, camera.towards_eye(points[corner]), seen);
-            Corner { place, depth, colour: mixed(&colours(corner, is_front), brightness) }
-        }));
-    }
-}
-
 /// Draws a strand; segments across the light are brighter.
 fn draw_strand(
     canvas: &mut Canvas,
@@ -163,7 +119,7 @@ fn draw_strand(
     width: f64,
     colours: impl Fn(usize) -> Colours,
 ) {
-    let lamp = LAMP.map(|component| component / norm(LAMP));
+    let lamp = towards_lamp();
     for end in strand.skip(1) {
         let offset = subtract(positions[end], positions[end - 1]);
         let along = dot(offset, lamp) / norm(offset).max(f64::MIN_POSITIVE);
@@ -175,44 +131,6 @@ fn draw_strand(
         let pixels = camera.pixels(width, 0.5 * (from.depth + to.depth));
         canvas.line(from, to, pixels.max(THINNEST));
     }
-}
-
-/// Draws the edges of triangles, slightly nearer than they are, so that they lie on top.
-fn draw_edges(canvas: &mut Canvas, camera: &Camera, positions: &[Vector3<f64>], triangles: &[[usize; 3]]) {
-    let corner = |vertex: usize| {
-        let (place, depth) = camera.project(positions[vertex]);
-        Corner { place, depth: 0.999 * depth, colour: EDGE }
-    };
-    for &[a, b, c] in triangles {
-        for (from, to) in [(a, b), (b, c), (c, a)] {
-            canvas.line(corner(from), corner(to), LINE);
-        }
-    }
-}
-
-/// Returns a colour in shade and in light.
-fn lit(colour: &[f32; 3]) -> Colours {
-    [colour.map(|channel| 0.35 * channel), *colour]
-}
-
-/// Returns the colours of the two sides of cloth of a colour; the back is paler.
-fn sides(colour: &[f32; 3]) -> [Colours; 2] {
-    let pale = colour.map(|channel| 0.65 * channel + 0.25);
-    [colour, &pale].map(|colour| [colour.map(|channel| 0.2 * channel), *colour])
-}
-
-fn mixed([dark, bright]: &Colours, brightness: f64) -> [f32; 3] {
-    std::array::from_fn(|channel| dark[channel] + brightness as f32 * (bright[channel] - dark[channel]))
-}
-
-/// Returns the brightness from the lamp, a weaker light at the eye, the sky, and a sheen at grazing angles. The last
-/// argument holds the visible parts of the lamp and of the surroundings.
-fn shade(normal: Vector3<f64>, lamp: Vector3<f64>, eye: Vector3<f64>, [sunlit, open]: [f64; 2]) -> f64 {
-    let facing = dot(normal, eye).clamp(0.0, 1.0);
-    let sheen = 0.16 * (1.0 - facing).powi(3);
-    let sky = 0.14 * (0.5 + 0.5 * normal[2]);
-    let around = 0.06 + 0.22 * facing * facing + sky + sheen;
-    (0.74 * sunlit * dot(normal, lamp).max(0.0) + (0.25 + 0.75 * open) * around).min(1.0)
 }
 
 /// Fills the picture with a colour, or with a grey that darkens downwards.
@@ -259,25 +177,96 @@ fn draw_shadow(
         .zip(view.widths)
         .flat_map(|(strand, width)| strand.clone().skip(1).map(|end| ([end - 1, end], *width)))
         .collect();
-    let mut all = FloorShadow::new(canvas);
-    for lamp in lamp_directions(LAMP.map(|component| component / norm(LAMP))) {
+    let mut all = FloorShadow::new(view.style.size.map(|pixels| pixels * OVERSAMPLING));
+    let lamps = (MOST_SHADOWS / triangles.len().max(1)).clamp(LAMPS[0], LAMPS[1]);
+    for lamp in lamp_directions(towards_lamp(), lamps) {
         let shadow: Vec<Vector3<f64>> = points.iter().map(|p| shadow_along(p, floor, lamp)).collect();
         all.add(camera, &shadow, triangles, &segments);
     }
-    all.draw(canvas);
+    all.draw(canvas, OVERSAMPLING);
 }
 
-/// Downsamples to the final size by averaging.
-fn averaged(canvas: &Pixmap, [width, height]: [u32; 2]) -> Option<Pixmap> {
-    let mut small = Pixmap::new(width, height)?;
-    let (source, row) = (canvas.data(), 4 * canvas.width() as usize);
-    for (index, byte) in small.data_mut().iter_mut().enumerate() {
-        let (pixel, channel) = (index / 4, index % 4);
-        let (x, y) = (pixel % width as usize, pixel / width as usize);
-        let n = OVERSAMPLING as usize;
-        let sum: u32 =
-            (0..n * n).map(|part| u32::from(source[(n * y + part / n) * row + 4 * (n * x + part % n) + channel])).sum();
-        *byte = ((sum + (n * n / 2) as u32) / (n * n) as u32) as u8;
+/// Covers a picture by a larger one, whose pixels are averaged where they are opaque.
+fn cover(picture: &mut Pixmap, canvas: &Pixmap) {
+    let n = OVERSAMPLING as usize;
+    let (width, row) = (picture.width() as usize, 4 * canvas.width() as usize);
+    let rows = picture.data_mut().chunks_exact_mut(4 * width).zip(canvas.data().chunks_exact(n * row));
+    for (pixels, covering) in rows {
+        for (column, pixel) in pixels.chunks_exact_mut(4).enumerate() {
+            let mut sums = [0_u32; 4];
+            for line in covering.chunks_exact(row) {
+                for part in line[4 * n * column..4 * n * (column + 1)].chunks_exact(4) {
+                    (0..4).for_each(|channel| sums[channel] += u32::from(part[channel]));
+                }
+            }
+            let all = (n * n) as u32;
+            let free = all - sums[3] / 255;
+            for (byte, sum) in pixel.iter_mut().zip(sums) {
+                *byte = ((sum + free * u32::from(*byte) + all / 2) / all) as u8;
+            }
+        }
     }
-    Some(small)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::shade::sides;
+    use super::*;
+
+    /// Draws a level square with a side of 1 m at a height, seen from the right, and returns the picture with its
+    /// camera.
+    fn square_above_the_floor(height: f64) -> (Pixmap, Camera) {
+        let at = |step: usize| step as f64 / 10.0 - 0.5;
+        let positions: Vec<Vector3<f64>> = (0..121).map(|n| [at(n % 11), at(n / 11), height]).collect();
+        let cells = (0..110).filter(|n| n % 11 != 10);
+        let triangles: Vec<[usize; 3]> = cells.flat_map(|a| [[a, a + 1, a + 12], [a, a + 12, a + 11]]).collect();
+        let camera = Camera::looking([3.0, 0.3, 4.0], [0.5, 0.3, 0.3], 30.0, [2400.0, 1800.0]);
+        let view = View {
+            positions: &positions,
+            triangles: &triangles,
+            strands: &[],
+            widths: &[],
+            garment_colours: &[],
+            solids: &[],
+            floor: Some(0.0),
+            camera: Some(camera),
+            look: Look::default(),
+            style: Style { size: [1200, 900], background: Some([1.0; 3]), ..Style::default() },
+        };
+        (Pixmap::decode_png(&picture_png(&view).unwrap()).unwrap(), camera)
+    }
+
+    fn green(picture: &Pixmap, camera: &Camera, point: Vector3<f64>) -> i32 {
+        let ([x, y], _) = camera.project(point);
+        i32::from(picture.pixel(x as u32 / OVERSAMPLING, y as u32 / OVERSAMPLING).unwrap().green())
+    }
+
+    #[test]
+    fn the_border_of_a_shadow_has_no_steps() {
+        let (picture, camera) = square_above_the_floor(1.0);
+        // Across the border of the shadow in x, which is blurred over 0.2 m. The picture has 2 mm per pixel, and
+        // the floor a line every 0.2 m.
+        let middle = shadow_of(&[0.0, 0.25, 1.0], 0.0);
+        let along = (0..300).map(|step| middle[0] + 0.3 + 0.4 * f64::from(step) / 300.0);
+        let beside_lines = along.filter(|x| (x / 0.2 - (x / 0.2).round()).abs() > 0.04);
+        let tones: Vec<i32> = beside_lines.map(|x| green(&picture, &camera, [x, middle[1], 0.0])).collect();
+        let (dark, bright) = (tones[0], tones[tones.len() - 1]);
+        assert!(bright > dark + 50, "{tones:?}");
+        let between: std::collections::BTreeSet<i32> = tones.iter().copied().collect();
+        assert!(between.len() > 40, "{between:?}");
+        let largest = tones.windows(2).map(|pair| (pair[1] - pair[0]).abs()).max().unwrap();
+        assert!(largest <= 5, "a step of {largest}: {tones:?}");
+    }
+
+    #[test]
+    fn cloth_has_a_rim_and_a_paler_back_and_stands_on_a_floor() {
+        let (picture, camera) = square_above_the_floor(0.5);
+        let inside = green(&picture, &camera, [0.2, -0.2, 0.5]);
+        let rim = green(&picture, &camera, [0.2, -0.5, 0.5]);
+        assert!(rim > inside + 5, "{rim} beside {inside}");
+        let floor = green(&picture, &camera, [0.93, -0.83, 0.0]);
+        assert!(floor < 250 && floor > 200, "{floor}");
+        let [front, back] = sides([0.4, 0.6, 0.8]);
+        assert!((0..2).all(|light| back[light][1] > front[light][1] + 0.1));
+    }
 }

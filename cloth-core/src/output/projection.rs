@@ -12,6 +12,16 @@ pub(crate) struct Camera {
     scale: f64,
 }
 
+/// The part of the floor that a row of pixels shows.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct FloorRow {
+    /// Horizontal coordinates at the left edge, in m, and their change per pixel.
+    pub start: [f64; 2],
+    pub step: [f64; 2],
+    /// Size of a pixel across the line of sight, in m.
+    pub pixel: f64,
+}
+
 impl Camera {
     /// Creates a camera that looks at the points from `direction` (from the points to the eye). They fill the fraction
     /// `fill` of a picture of this size.
@@ -67,6 +77,23 @@ impl Camera {
         let [right, down, depth] = self.axes.map(|axis| dot(axis, subtract(point, self.eye)));
         let image = [right / depth, down / depth];
         (std::array::from_fn(|axis| self.centre[axis] + self.scale * image[axis]), depth)
+    }
+
+    /// Returns the floor at a height, as seen from above in a row of pixels of this length; `None` if the row does not
+    /// show it. The horizontal axis of the picture is level, so that the depth is the same in the whole row.
+    pub(crate) fn floor_row(&self, row: f64, height: f64, length: f64) -> Option<FloorRow> {
+        let [right, down, forward] = self.axes;
+        let offset = (row - self.centre[1]) / self.scale;
+        let fall = -(forward[2] + offset * down[2]);
+        let depth = (self.eye[2] - height) / fall;
+        let pixel = depth / self.scale;
+        if !(self.eye[2] > height && fall > 0.0 && (pixel * length).is_finite()) {
+            return None;
+        }
+        let step = [pixel * right[0], pixel * right[1]];
+        let start = [0, 1]
+            .map(|axis| self.eye[axis] + depth * (forward[axis] + offset * down[axis]) - self.centre[0] * step[axis]);
+        Some(FloorRow { start, step, pixel })
     }
 
     /// Returns the unit vector from a point to the eye.

@@ -4,7 +4,7 @@ use energy_dsl::Vector3;
 
 use super::picture::{View, shadow_of};
 use super::projection::Camera;
-use super::style::{camera_on, is_visible};
+use super::style::{camera_on, garment_colour, is_visible};
 use super::{Look, PictureError, SolidMesh, picture_png};
 use crate::contact::{AnySolid, Obstacle};
 use crate::geometry::{Bounds, dot};
@@ -20,7 +20,7 @@ pub struct Scenery {
     strands: Vec<Range<usize>>,
     /// Width of each strand, in m.
     widths: Vec<f64>,
-    /// The colour of each vertex; empty if no garment sets one.
+    /// The colour of each vertex; `None` for hair without one.
     colours: Vec<Option<[f32; 3]>>,
     obstacles: Vec<Obstacle>,
     style: Style,
@@ -102,9 +102,10 @@ impl Scenery {
             PartKind::Hair { joints, width, .. } => vec![width; part.vertices.len() / joints],
             PartKind::Cloth(_) => Vec::new(),
         });
-        let has_colours = parts.iter().any(|part| part.colour.is_some());
-        let coloured = if has_colours { parts } else { &[] };
-        let colours = coloured.iter().flat_map(|part| vec![part.colour; part.vertices.len()]);
+        let colours = parts.iter().enumerate().flat_map(|(number, part)| {
+            let colour = part.colour.or(matches!(part.kind, PartKind::Cloth(_)).then(|| garment_colour(number)));
+            vec![colour; part.vertices.len()]
+        });
         Self {
             triangles: simulation.triangles().to_vec(),
             strands: simulation.strands().to_vec(),

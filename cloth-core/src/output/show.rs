@@ -1,6 +1,6 @@
 use energy_dsl::Vector3;
 
-use super::style::linear;
+use super::style::{garment_colour, linear};
 use super::track::{Joined, Track};
 use super::{Framing, Look, PictureError, Scenery, SolidMesh};
 use crate::geometry::Bounds;
@@ -9,9 +9,7 @@ use crate::model::PartKind;
 use crate::scene::Style;
 use crate::simulation::Simulation;
 
-/// Colours of garments (cyclic), of hair and of solids.
-const COLOURS: [[f32; 3]; 5] =
-    [[0.16, 0.34, 0.52], [0.55, 0.20, 0.14], [0.20, 0.42, 0.24], [0.58, 0.42, 0.12], [0.36, 0.22, 0.44]];
+/// Linear colours of hair and of solids.
 const HAIR: [f32; 3] = [0.28, 0.15, 0.07];
 const SOLID: [f32; 3] = [0.50, 0.48, 0.45];
 
@@ -91,9 +89,7 @@ impl<'a> Show<'a> {
         for (number, part) in self.simulation.parts().iter().enumerate() {
             let frames = self.frames.iter().map(|frame| &frame[part.vertices.clone()]).collect();
             let (joined, colour, width) = match part.kind {
-                PartKind::Cloth(_) => {
-                    (Joined::Triangles(&self.triangles[number]), COLOURS[number % COLOURS.len()], 0.0)
-                }
+                PartKind::Cloth(_) => (Joined::Triangles(&self.triangles[number]), linear(garment_colour(number)), 0.0),
                 PartKind::Hair { width, .. } => (Joined::Strands(&self.strands[number]), HAIR, width),
             };
             let colour = part.colour.map_or(colour, linear);

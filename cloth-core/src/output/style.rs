@@ -8,6 +8,15 @@ use crate::scene::{Style, Viewpoint};
 /// Direction from the cloth to the eye.
 const VIEW: Vector3<f64> = [0.62, -1.0, 0.28];
 
+/// RGB colours of garments without one of their own (cyclic), from 0 to 1, as screens show them.
+const GARMENTS: [[f32; 3]; 5] =
+    [[0.40, 0.66, 0.86], [0.86, 0.47, 0.36], [0.47, 0.70, 0.49], [0.90, 0.72, 0.38], [0.65, 0.52, 0.78]];
+
+/// Returns the colour of the garment of this number, from 0.
+pub(super) fn garment_colour(number: usize) -> [f32; 3] {
+    GARMENTS[number % GARMENTS.len()]
+}
+
 /// Supersampling factor: anti-aliases without seams between triangles.
 pub(super) const OVERSAMPLING: u32 = 2;
 
