@@ -34,7 +34,7 @@ impl Tester {
         let at = |p: &Vector3<f64>| [map[0][0] * p[0] + map[0][1] * p[1], map[1][0] * p[0] + map[1][1] * p[1], 0.0];
         let x: Vec<Vector3<f64>> = self.mesh.vertices().iter().map(at).collect();
         let energies = self.system.energies(&x).unwrap();
-        // Triangles, and nodal averages beside them.
+        // Triangles and nodal averages.
         let membrane: f64 =
             energies.iter().filter(|one| one.term.ends_with("membrane")).filter_map(|one| one.energy).sum();
         let corner = |triangle: &[usize; 3], k: usize| self.mesh.vertices()[triangle[k]];

@@ -127,7 +127,7 @@ const LOCK: &str = "cloth.lock";
 /// The largest scene or mesh of a test, in bytes.
 const LARGEST_SCENE: u64 = 16 << 20;
 
-/// What the folder of a test holds.
+/// The files in the folder of a test.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Earlier {
     Nothing,

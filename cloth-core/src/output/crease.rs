@@ -13,7 +13,7 @@ pub(super) const SIMILAR: f64 = 4.0;
 /// An edge of a triangle: its vertices in ascending order, and the triangle with the index of the edge's first corner.
 pub(super) type Side = ([usize; 2], usize, usize);
 
-/// A mesh whose vertices are split along its sharp edges: each smooth part has vertices of its own.
+/// A mesh whose vertices are split along its sharp edges: each smooth part has separate vertices.
 pub(super) struct Creased {
     /// The original vertex of each vertex.
     pub originals: Vec<usize>,
@@ -140,7 +140,7 @@ impl Fans {
 
 /// Returns unit normals, and the length of the shortest edge at each vertex. Where edges are of similar length, the
 /// weights are those of Max (1999), which are exact on spheres: n = Σ a × b/(‖a‖² ‖b‖²) over the triangles with edges a
-/// and b at the vertex. Elsewhere they are areas, so that large flat triangles beside those of a rounded edge look flat.
+/// and b at the vertex. Elsewhere they are areas, so that large flat triangles next to those of a rounded edge look flat.
 fn normals(
     points: &[Vector3<f64>],
     originals: &[[usize; 3]],

@@ -56,7 +56,7 @@ impl SmoothSurface {
         Self::of(&Subdivided::none(points, triangles), level, CREASE)
     }
 
-    /// Divides triangles. Edges are sharp where the normals beside them have a cosine below `crease`.
+    /// Divides triangles. Edges are sharp where the adjacent normals have a cosine below `crease`.
     fn of(mesh: &Subdivided, level: usize, crease: f64) -> Self {
         let Subdivided { points, triangles, parents } = mesh;
         let creased = Creased::of(points, triangles, crease);

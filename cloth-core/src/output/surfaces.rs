@@ -16,7 +16,7 @@ const EDGE: [f32; 3] = [0.08, 0.09, 0.11];
 /// Line width of edges, and of the rim of cloth, in pixels before downsampling.
 const LINE: f64 = 1.5 * OVERSAMPLING as f64;
 const RIM: f64 = 1.3 * OVERSAMPLING as f64;
-/// How much brighter the rim is than the cloth.
+/// Brightness of the rim relative to the cloth.
 const RIM_LIGHT: f32 = 0.14;
 
 /// Size of the triangles that are drawn, in pixels before downsampling.

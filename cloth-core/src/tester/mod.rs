@@ -153,7 +153,7 @@ impl Trial {
         }
     }
 
-    /// Returns the scene file of the test for a fabric, and its mesh as an OBJ file beside it, if it needs one.
+    /// Returns the scene file of the test for a fabric, and its mesh as an OBJ file, if it needs one.
     ///
     /// # Errors
     /// Returns an error if the fabric does not fit the specimen.

@@ -1,7 +1,7 @@
 //! Folds of stiff cloth on irregular meshes: linear triangles lock, nodal averages of the strain do not.
 //!
 //! * **drape**: a disc of 30 cm on one of 18 cm (Cusick). One cloth with a bending length of 15 mm and a shear stiffness
-//!   of 38.6 N/m, whose tensile stiffness differs. Both rings of vertices beside the edge of the small disc are held, so
+//!   of 38.6 N/m, whose tensile stiffness differs. Both rings of vertices next to the edge of the small disc are held, so
 //!   that the clamp is in the middle between them. The exact value is the limit of finer meshes: 49 to 50 % with
 //!   triangles of 500 N/m and edges of 3 mm, and with nodal averages of 20,000 N/m and edges of 4 and 5.5 mm.
 //! * **balloon**: two discs of inextensible film, joined at the rim and inflated (Paulsen 1994; Mladenov and Oprea 2003).

@@ -16,7 +16,7 @@ use super::Strain;
 
 /// The wasted share, times D/(K κ² h⁴).
 const WASTE: f64 = 7.5e-5;
-/// The share that plain triangles may waste beside nodal averages, which carry the rest of the stiffness.
+/// The share that plain triangles may waste where nodal averages carry the rest of the stiffness.
 const PLAIN_SHARE: f64 = 0.02;
 /// The largest share without a warning.
 const LARGEST_SHARE: f64 = 0.05;

@@ -73,7 +73,7 @@ fn material_triangles(mesh: &TriangleMesh, fabric: &Fabric) -> Result<(Vec<Mater
 }
 
 impl FabricTerms {
-    /// Adds triangles, or nodal averages beside triangles as stiff as they can be without locking.
+    /// Adds triangles; if they would lock, softer ones and nodal averages.
     pub(super) fn add_membrane<E>(
         &mut self,
         name: &str,

@@ -22,10 +22,10 @@ use crate::mesh::MaterialTriangle;
 /// The Green strain along warp and weft: (E_uu, E_vv, 2 E_uv).
 pub(super) type Strain = [f64; 3];
 
-/// What to evaluate.
+/// The derivatives to evaluate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Order {
-    /// The energy.
+    /// The energy alone.
     Value,
     /// Energy and stress.
     Gradient,

@@ -26,7 +26,7 @@ pub(super) struct Patch {
 /// A triangle of a patch.
 #[derive(Clone, Copy, Debug)]
 struct Corner {
-    /// Positions of the corners beside the middle in [`Patch::vertices`].
+    /// Positions of the two corners other than the middle in [`Patch::vertices`].
     ends: [usize; 2],
     /// ∇N of these corners along warp and weft, in 1/m: the rows of D_m⁻¹, where the columns of D_m are the edges from
     /// the middle.

@@ -36,7 +36,7 @@ pub struct TensionLaw {
     pub tension: f64,
 }
 
-/// What a KES-F tensile tester prints.
+/// The results of a KES-F tensile tester.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Kes {
@@ -51,7 +51,7 @@ pub struct Kes {
     pub load: f64,
 }
 
-/// What a FAST-3 extension meter prints: strains at 4.9, 19.6 and 98.1 N/m.
+/// The results of a FAST-3 extension meter: strains at 4.9, 19.6 and 98.1 N/m.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Fast {
