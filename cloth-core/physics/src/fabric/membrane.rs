@@ -90,16 +90,16 @@ impl FabricTerms {
         let at_rest = |source| FabricError::Rest { triangle: 0, source };
         let moduli = nodal::moduli_at_rest(&element).map_err(at_rest)?;
         let shapes = RestShapes::new(cloth.mesh, &cloth.triangles, cloth.is_woven);
-        let plain = match cloth.strain {
-            Strain::Nodal => nodal::plain_moduli(&shapes, &cloth.folds, &moduli),
-            Strain::PerTriangle => None,
-        };
         let edges = shapes.edge_lengths();
         let edge = edges.iter().sum::<f64>() / edges.len() as f64;
         let locking = Locking::new(&cloth.folds, nodal::tensile_stiffness(&moduli), edge, cloth.strain);
         if self.locking.is_none_or(|known| known.stiffness < locking.stiffness) && locking.wasted.is_normal() {
             self.locking = Some(locking);
         }
+        let plain = match cloth.strain {
+            Strain::Nodal if locking.would_lock() => nodal::plain_moduli(&shapes, &cloth.folds, &moduli),
+            _ => None,
+        };
         let Some(plain) = plain else { return self.add_triangles(name, cloth, move |_, rest| element(rest)) };
         let of_triangles = shapes.means_of_corners(&plain);
         self.add_triangles(name, cloth, move |triangle, [u0, u1, u2]| {

@@ -15,10 +15,10 @@ pub(in super::super) fn moduli_at_rest<E: PackedPotential<f64> + std::fmt::Debug
     Ok(TriangleLaw::new(&[1.0], element)?.respond(&[[0.0; 3]], Order::Hessian).0[0].moduli)
 }
 
-/// Returns the tensile stiffness of a narrow strip along the stiffer of warp and weft.
-pub(in super::super) fn tensile_stiffness(&[[uu, uv, _], [_, vv, _], _]: &Moduli) -> f64 {
+/// Returns the tensile stiffness of a narrow strip along the stiffest of warp, weft and, in pure shear, the diagonals.
+pub(in super::super) fn tensile_stiffness(&[[uu, uv, _], [_, vv, _], [_, _, shear]]: &Moduli) -> f64 {
     let narrow = |along: f64, across: f64| if across > 0.0 { along - uv * uv / across } else { along };
-    narrow(uu, vv).max(narrow(vv, uu))
+    narrow(uu, vv).max(narrow(vv, uu)).max(2.0 * shear)
 }
 
 /// Returns C_v of each fan: the moduli at rest, with eigenvalues cut to what plain triangles carry without locking.
