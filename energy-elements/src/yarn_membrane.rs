@@ -45,16 +45,16 @@ energy! {
             let slope = k + m^2 * (3 * a + 5 * m^2 * b);
             polynomial(m, k, a, b) + t * (tension + slope / 2 * t)
         }
-        fn squeezed(e, k, c, w) {
+        fn buckled(e, k, c, w) {
             let t = e + w;
-            if t > 0 {
-                e^2 * (k / 2 + (k - c) / (6 * w) * e)
-            } else {
-                w^2 * (2 * k + c) / 6 - t * ((k + c) / 2 * w - c / 2 * t)
-            }
+            w^2 * (2 * k + c) / 6 - t * ((k + c) / 2 * w - c / 2 * t)
         }
+        // One formula on both sides of e = 0: a choice between two would be a tie at rest.
         fn yarn(e, k, a, b, m, c, w) {
-            if e > 0 { if e < m { polynomial(e, k, a, b) } else { beyond(e, k, a, b, m) } } else { squeezed(e, k, c, w) }
+            let n = min(e, 0);
+            let p = max(e, 0);
+            let near = k / 2 * e^2 + (k - c) / (6 * w) * n^3 + p^4 * (a / 4 + p^2 * b / 6);
+            if e < m { if e > -w { near } else { buckled(e, k, c, w) } } else { beyond(e, k, a, b, m) }
         }
         // F = D D_m⁻¹ times the scaled det D_m. Dividing last gives an exact zero at rest if edges are exact.
         let F = columns(x1 - x0, x2 - x0) * B;

@@ -120,5 +120,6 @@ fn a_swinging_skirt_is_followed() {
     }
     let (tracked, skinned) = (ErrorSummary::of(tracked), ErrorSummary::of(skinned));
     println!("a swinging skirt: mean {:.1} mm; the hips alone {:.1} mm", tracked.mean, skinned.mean);
-    assert!(tracked.mean <= 10.0 && skinned.mean > 10.0, "{tracked:?}; the hips alone: {skinned:?}");
+    // The skirt moves against the hips, and most of that is tracked.
+    assert!(tracked.mean <= 10.0 && skinned.mean > 2.0 * tracked.mean, "{tracked:?}; the hips alone: {skinned:?}");
 }
