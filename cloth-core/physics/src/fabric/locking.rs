@@ -127,7 +127,7 @@ impl fmt::Display for Locking {
         write!(
             f,
             ": {effect}, by about {:.0} points of a drape coefficient. Use `strain = \"nodal\"`, edges of \
-             {sufficient_edge:.1} mm, or a stiffness of {sufficient_stiffness:.0} N/m with a strain limit",
+             {sufficient_edge:.1} mm, or a stiffness of {sufficient_stiffness:.2} N/m with a strain limit",
             self.drape_error()
         )
     }

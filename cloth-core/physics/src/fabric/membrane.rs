@@ -89,18 +89,18 @@ impl FabricTerms {
         }
         let at_rest = |source| FabricError::Rest { triangle: 0, source };
         let moduli = nodal::moduli_at_rest(&element).map_err(at_rest)?;
-        let shapes = RestShapes::new(cloth.mesh, &cloth.triangles, cloth.is_woven);
-        let edges = shapes.edge_lengths();
-        let edge = edges.iter().sum::<f64>() / edges.len() as f64;
-        let locking = Locking::new(&cloth.folds, nodal::tensile_stiffness(&moduli), edge, cloth.strain);
-        if self.locking.is_none_or(|known| known.stiffness < locking.stiffness) && locking.wasted.is_normal() {
+        let (stiffness, edge) = (nodal::tensile_stiffness(&moduli), nodal::mean_edge(cloth.triangles.iter()));
+        let locking = Locking::new(&cloth.folds, stiffness, edge, cloth.strain);
+        if self.locking.is_none_or(|known| known.stiffness < stiffness) && locking.wasted.is_normal() {
             self.locking = Some(locking);
         }
-        let plain = match cloth.strain {
-            Strain::Nodal if locking.would_lock() => nodal::plain_moduli(&shapes, &cloth.folds, &moduli),
-            _ => None,
+        if cloth.strain == Strain::PerTriangle || !locking.would_lock() {
+            return self.add_triangles(name, cloth, move |_, rest| element(rest));
+        }
+        let shapes = RestShapes::new(cloth.mesh, &cloth.triangles, cloth.is_woven);
+        let Some(plain) = nodal::plain_moduli(&shapes, &cloth.folds, &moduli) else {
+            return self.add_triangles(name, cloth, move |_, rest| element(rest));
         };
-        let Some(plain) = plain else { return self.add_triangles(name, cloth, move |_, rest| element(rest)) };
         let of_triangles = shapes.means_of_corners(&plain);
         self.add_triangles(name, cloth, move |triangle, [u0, u1, u2]| {
             let [[c_uu, c_uv, _], [_, c_vv, _], [_, _, c_ss]] = of_triangles[triangle];

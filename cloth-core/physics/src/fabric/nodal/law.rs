@@ -23,7 +23,7 @@ use crate::mesh::MaterialTriangle;
 pub(super) type Strain = [f64; 3];
 
 /// The derivatives to evaluate.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Order {
     /// The energy alone.
     Value,
@@ -158,7 +158,7 @@ impl<E: PackedPotential<f64>> BatchWork<E> for Responses<'_> {
         L::F64::store_transposed(&numbers, batch.count, &mut self.rows, NUMBERS);
         for lane in 0..batch.count {
             let (patch, row) = (batch.first + lane, &self.rows[NUMBERS * lane..][..NUMBERS]);
-            self.all[patch] = response(row, &self.factors[patch], self.sides[patch]);
+            self.all[patch] = response(row, &self.factors[patch], self.sides[patch], self.order);
         }
         let lanes = energy_dsl::Mask::bits(flags.degenerate | flags.kink) & (u32::MAX >> (32 - batch.count));
         self.flagged += u64::from(lanes.count_ones());
@@ -173,11 +173,18 @@ fn with_gradient<V: Copy>(value: V, gradient: &[[V; 3]]) -> [V; 4] {
 
 /// Turns derivatives by corners into derivatives by strain.
 #[inline(always)]
-fn response(numbers: &[f64], &[p, q, r]: &[f64; 3], side: f64) -> Response {
+fn response(numbers: &[f64], &[p, q, r]: &[f64; 3], side: f64, order: Order) -> Response {
+    if order == Order::Value {
+        return Response { energy: numbers[0], ..Response::default() };
+    }
     let [g_p, g_q, g_r] = [1, 2, 3].map(|number| side * numbers[number]);
     let s_vv = g_r / r;
     let s_uv = (g_q - q * s_vv) / p;
     let s_uu = (g_p - q * s_uv) / p;
+    let first = Response { energy: numbers[0], stress: [s_uu, s_vv, s_uv], ..Response::default() };
+    if order == Order::Gradient {
+        return first;
+    }
     let [pp, pq, pr, qq, qr, rr] = [4, 5, 6, 7, 8, 9].map(|number| side * side * numbers[number]);
     let h = [[pp - s_uu, pq - s_uv, pr], [pq - s_uv, qq - s_vv, qr], [pr, qr, rr - s_vv]];
     // Rows of L⁻¹: ∂(p, q, r)/∂E.
@@ -199,5 +206,5 @@ fn response(numbers: &[f64], &[p, q, r]: &[f64; 3], side: f64) -> Response {
             (moduli[i][j], moduli[j][i]) = (sum, sum);
         }
     }
-    Response { energy: numbers[0], stress: [s_uu, s_vv, s_uv], moduli }
+    Response { moduli, ..first }
 }

@@ -25,6 +25,6 @@ mod symmetric;
 mod term;
 
 pub(super) use split::{moduli_at_rest, plain_moduli, tensile_stiffness};
-pub(super) use term::{NodalMembrane, RestShapes};
+pub(super) use term::{NodalMembrane, RestShapes, mean_edge};
 #[cfg(test)]
 mod tests;

@@ -70,18 +70,10 @@ impl<'a> RestShapes<'a> {
         Self { mesh, rest, fans: fans(mesh, rest, is_woven) }
     }
 
-    /// Returns one number per fan: a mean over the sides of its triangles of their length in m.
+    /// Returns a mean edge length per fan, in m.
     pub fn edge_lengths(&self) -> Vec<f64> {
-        let perimeter = |plane: MaterialTriangle| -> f64 {
-            (0..3)
-                .map(|k| (0..2).map(|axis| (plane[(k + 1) % 3][axis] - plane[k][axis]).powi(2)).sum::<f64>().sqrt())
-                .sum()
-        };
-        let mean = |fan: &Fan| {
-            let sum: f64 = fan.iter().map(|corner| perimeter(self.rest[corner.triangle])).sum();
-            sum / (3 * fan.len()) as f64
-        };
-        self.fans.iter().map(mean).collect()
+        let of_fan = |fan: &Fan| mean_edge(fan.iter().map(|corner| &self.rest[corner.triangle]));
+        self.fans.iter().map(of_fan).collect()
     }
 
     /// Returns the mean over the corners of each triangle of a matrix per fan.
@@ -95,6 +87,15 @@ impl<'a> RestShapes<'a> {
         }
         means
     }
+}
+
+/// Returns the mean length of the sides of triangles, in m.
+pub(in super::super) fn mean_edge<'a>(triangles: impl ExactSizeIterator<Item = &'a MaterialTriangle>) -> f64 {
+    let sides = 3 * triangles.len();
+    let perimeter = |&[a, b, c]: &MaterialTriangle| -> f64 {
+        [[a, b], [b, c], [c, a]].iter().map(|[from, to]| (to[0] - from[0]).hypot(to[1] - from[1])).sum()
+    };
+    triangles.map(perimeter).sum::<f64>() / sides as f64
 }
 
 impl NodalMembrane {
