@@ -43,7 +43,9 @@ pub use numbers::{
     Unbounded, UnknownLevel, available, dispatch, dispatch_at, level,
 };
 #[doc(hidden)]
-pub use numbers::{Care, Precautions, Ray, Roles, WithCare, settle, with_care};
+pub use numbers::{
+    Care, GeneralPath, MASKS, Precautions, Ray, Roles, Trace, TraceStep, WithCare, elementary_functions, settle, with_care,
+};
 pub use results::{
     ConstraintHessian, ConstraintJacobian, ForceJacobians, ForceValue, Gradient, Hessian, HessianVector,
     ReducedHessian, ResidualJacobian, ResidualValue, Value,

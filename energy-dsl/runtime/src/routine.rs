@@ -27,10 +27,48 @@ pub enum RoutineKind {
     Residual,
     /// r and ∂r/∂u.
     Jacobian,
+    /// U, and its first and second derivatives by the point of this number.
+    Vertex(u8),
 }
 
+/// The names of [`RoutineKind::Vertex`]. Elements have at most 32 points.
+const VERTEX_NAMES: [&str; 32] = [
+    "vertex_0",
+    "vertex_1",
+    "vertex_2",
+    "vertex_3",
+    "vertex_4",
+    "vertex_5",
+    "vertex_6",
+    "vertex_7",
+    "vertex_8",
+    "vertex_9",
+    "vertex_10",
+    "vertex_11",
+    "vertex_12",
+    "vertex_13",
+    "vertex_14",
+    "vertex_15",
+    "vertex_16",
+    "vertex_17",
+    "vertex_18",
+    "vertex_19",
+    "vertex_20",
+    "vertex_21",
+    "vertex_22",
+    "vertex_23",
+    "vertex_24",
+    "vertex_25",
+    "vertex_26",
+    "vertex_27",
+    "vertex_28",
+    "vertex_29",
+    "vertex_30",
+    "vertex_31",
+];
+
 impl RoutineKind {
-    /// All kinds of routines.
+    /// All kinds of routines but those of single vertices.
     pub const ALL: [Self; 13] = [
         Self::Rest,
         Self::Value,
@@ -64,13 +102,15 @@ impl RoutineKind {
             Self::GaussNewton => "gauss_newton",
             Self::Residual => "residual",
             Self::Jacobian => "jacobian",
+            Self::Vertex(point) => VERTEX_NAMES[point as usize % VERTEX_NAMES.len()],
         }
     }
 
     /// Returns the kind of a name; `None` for any other text.
     #[must_use]
     pub fn named(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|kind| kind.name() == name)
+        let of_vertices = (0..32).map(Self::Vertex);
+        Self::ALL.into_iter().chain(of_vertices).find(|kind| kind.name() == name)
     }
 
     /// Returns whether the first group of results is of values, not of derivatives.
@@ -82,7 +122,15 @@ impl RoutineKind {
     /// Returns whether the first result is an energy, which is infinite outside of its domain.
     #[must_use]
     pub const fn is_energy(self) -> bool {
-        matches!(self, Self::Value | Self::Gradient | Self::Hessian | Self::ReducedHessian | Self::GaussNewton)
+        matches!(
+            self,
+            Self::Value
+                | Self::Gradient
+                | Self::Hessian
+                | Self::ReducedHessian
+                | Self::GaussNewton
+                | Self::Vertex(_)
+        )
     }
 }
 
@@ -93,6 +141,7 @@ mod tests {
     #[test]
     fn names_lead_back_to_their_kinds() {
         assert!(RoutineKind::ALL.into_iter().all(|kind| RoutineKind::named(kind.name()) == Some(kind)));
+        assert_eq!(RoutineKind::named("vertex_12"), Some(RoutineKind::Vertex(12)));
         assert_eq!(RoutineKind::named("hess"), None);
     }
 }

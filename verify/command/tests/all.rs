@@ -2,6 +2,7 @@
 #![allow(missing_docs)]
 
 mod bench;
+mod c;
 mod command_line;
 mod elements;
 mod errata;

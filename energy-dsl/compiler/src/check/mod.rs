@@ -113,6 +113,7 @@ fn check_declaration(
         audit_scope: declaration.audit_scope.clone(),
         properties: declaration.properties.clone(),
         uncompensated: declaration.uncompensated,
+        vertices: declaration.vertices,
         kind: declaration.kind,
         source: declaration.source.clone(),
         formula: declaration.formula.clone(),

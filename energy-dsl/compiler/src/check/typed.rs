@@ -23,6 +23,8 @@ pub struct Program {
     pub properties: Vec<(Property, Span)>,
     /// Whether rounding errors are not compensated.
     pub uncompensated: bool,
+    /// Whether it has routines for single vertices.
+    pub vertices: bool,
     /// Kind of the declaration.
     pub kind: Kind,
     /// Text of the declaration.

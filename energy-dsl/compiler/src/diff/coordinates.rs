@@ -52,6 +52,26 @@ impl Coordinates {
         Self { seeds, vectors, components: 1, translation_invariant: false }
     }
 
+    /// Creates the coordinates of one point. Only these move.
+    pub fn of_point(&self, g: &mut Graph, point: usize) -> Self {
+        let mut seeds = BTreeMap::new();
+        for (&node, entries) in &self.seeds {
+            let mut weights = [0.0; 3];
+            for &(coordinate, sign) in entries {
+                let sign = g.as_constant(sign).expect("compiler bug: seeds are constants");
+                let vector = &self.vectors[coordinate / self.components];
+                let weight = vector.iter().filter(|(other, _)| *other == point).map(|(_, weight)| weight).sum::<f64>();
+                weights[coordinate % self.components] += sign * weight;
+            }
+            let parts = weights.iter().enumerate().filter(|(_, weight)| **weight != 0.0);
+            let seed: Sparse = parts.map(|(axis, &weight)| (axis, g.constant(weight))).collect();
+            if !seed.is_empty() {
+                seeds.insert(node, seed);
+            }
+        }
+        Self { seeds, vectors: vec![vec![(point, 1.0)]], components: 3, translation_invariant: false }
+    }
+
     /// Creates a single coordinate, the distance along a direction that is given in these coordinates.
     pub(super) fn along(&self, g: &mut Graph, direction: &[NodeId]) -> Self {
         let mut seeds = BTreeMap::new();

@@ -97,6 +97,7 @@ fn names(kind: RoutineKind) -> (&'static str, &'static str) {
         RoutineKind::GaussNewton => ("GaussNewtonCall", "Hessian"),
         RoutineKind::Residual => ("ResidualCall", "ResidualValue"),
         RoutineKind::Jacobian => ("ResidualJacobianCall", "ResidualJacobian"),
+        RoutineKind::Vertex(_) => ("VertexCall", "Vertex"),
         RoutineKind::Rest => unreachable!("compiler bug: the rest block is run by `new`"),
     }
 }

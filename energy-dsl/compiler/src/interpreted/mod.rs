@@ -22,7 +22,7 @@ use crate::plan::Plan;
 use crate::properties::prove;
 use crate::routines::{Routines, differentiate};
 use crate::tape::{TooLarge, tapes};
-use energy_runtime::{Declaration, tape};
+use energy_runtime::{Declaration, Kind, tape};
 
 pub use elements::{Elements, EvaluateError};
 pub use inputs::{BindError, InputKind, InputNumbers};
@@ -95,6 +95,19 @@ impl Interpreted {
         Self::compiled(&file_programs(text, file, budget)?)
     }
 
+    /// Compiles the declarations in the text of a file, energies and constraints with routines for single vertices, as
+    /// if they had the attribute `#[vertex]`.
+    ///
+    /// # Errors
+    /// Whatever is wrong with the text, and a budget that is spent.
+    pub fn from_file_with_vertices(text: &str, file: &str, budget: &Budget) -> Result<Vec<Self>, Diagnostics> {
+        let mut programs = file_programs(text, file, budget)?;
+        for program in &mut programs {
+            program.vertices |= matches!(program.kind, Kind::Energy | Kind::Constraint);
+        }
+        Self::compiled(&programs)
+    }
+
     /// Compiles programs whose claims an audit may check.
     fn compiled(programs: &[Program]) -> Result<Vec<Self>, Diagnostics> {
         let mut diagnostics = Diagnostics::default();
@@ -144,6 +157,11 @@ impl Interpreted {
     #[must_use]
     pub fn declaration(&self) -> &Arc<Declaration> {
         &self.plan.declaration
+    }
+
+    /// Returns the plan of all routines.
+    pub(crate) fn plan(&self) -> &Plan {
+        &self.plan
     }
 
     /// Returns all inputs in declared order: points or unknowns, rest shape, parameters. Stiffness `ks` and damping

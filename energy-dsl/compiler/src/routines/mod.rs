@@ -261,6 +261,10 @@ pub fn differentiate(
         Kind::Residual => residual(g, &outputs, &coordinates, &mut routes),
     };
     let primitives = primitives(g, &outputs, &list);
+    let mut list = list;
+    if program.vertices {
+        list.extend(vertices(g, list[0].groups[0][0], &coordinates, program.points(), &mut routes));
+    }
     let list = list.into_iter().map(|whole| whole.split(g)).collect();
     Routines {
         rest,
@@ -312,6 +316,28 @@ fn potential(
         Whole::new(RoutineKind::ReducedHessian, reduced, reduced_groups, hazards[2]),
         Whole::new(RoutineKind::HessianVector, product, vec![full_product], hazards[2]),
     ]
+}
+
+/// Creates the value and its derivatives by each point alone.
+fn vertices(
+    g: &mut Graph,
+    value: NodeId,
+    coordinates: &Coordinates,
+    points: usize,
+    routes: &mut Vec<Routes>,
+) -> Vec<Whole> {
+    let hazards = hazards(g, &[(value, 2)]);
+    let of_point = |point: usize| {
+        let kind = RoutineKind::Vertex(u8::try_from(point).expect("few points"));
+        let own = coordinates.of_point(g, point);
+        let (energy, taken) = second_order(g, kind.name(), value, &own);
+        routes.push(taken);
+        let entry = |row: usize, column: usize| energy.hessian[[[0, 1, 2], [1, 3, 4], [2, 4, 5]][row][column]];
+        let block: Vec<NodeId> = (0..9).map(|number| entry(number / 3, number % 3)).collect();
+        let reduced = [&[energy.value], &energy.gradient[..], &energy.hessian[..]].concat();
+        Whole::new(kind, reduced, vec![vec![energy.value], energy.gradient, block], hazards)
+    };
+    (0..points).map(of_point).collect()
 }
 
 fn force(

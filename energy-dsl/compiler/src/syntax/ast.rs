@@ -74,6 +74,8 @@ pub struct Declaration {
     pub properties: Vec<(Property, Span)>,
     /// Whether the declaration has the attribute `#[uncompensated]`.
     pub uncompensated: bool,
+    /// Whether the declaration has the attribute `#[vertex]`.
+    pub vertices: bool,
     /// Limits of `#[limits(…)]`; `None` without it.
     pub limits: Option<Limits>,
     /// Kind of the declaration.

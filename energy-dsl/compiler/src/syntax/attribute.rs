@@ -15,12 +15,13 @@ pub(super) struct Attributes {
     pub(super) audit_scope: AuditScope,
     pub(super) properties: Vec<(Property, Span)>,
     pub(super) uncompensated: bool,
+    pub(super) vertices: bool,
     pub(super) limits: Option<Limits>,
 }
 
 impl Parser<'_> {
     /// Parses an attribute after its `#`: `[doc = "…"]`, `[audit]`, `[audit(samples = n, …)]`, `[invariant(translation,
-    /// rotation)]`, `[rest_state(zero_force)]`, `[even]`, `[uncompensated]` or `[limits(steps = n, bytes = n)]`.
+    /// rotation)]`, `[rest_state(zero_force)]`, `[even]`, `[uncompensated]`, `[vertex]` or `[limits(steps = n, bytes = n)]`.
     pub(super) fn attribute(&mut self, attributes: &mut Attributes) -> Parsed<()> {
         if self.fault().is_none() && !self.is("[") {
             let comment =
@@ -47,12 +48,14 @@ impl Parser<'_> {
             "rest_state" => self.properties(&[("zero_force", Property::ZeroForceAtRest)], attributes)?,
             "even" => attributes.properties.push((Property::Even, name.span)),
             "uncompensated" => attributes.uncompensated = true,
+            "vertex" => attributes.vertices = true,
             "limits" => attributes.limits = Some(self.limits()?),
             other => {
                 return Err(Box::new(Diagnostic::new(&name.span, format!("unknown attribute `{other}`")).help(
                     "a declaration takes doc comments, #[audit], #[audit(samples = 200)], \
                      #[audit(domain(k = 1..10), tolerance = 1e-6)], #[invariant(translation, rotation)], \
-                     #[rest_state(zero_force)], #[even], #[uncompensated] and #[limits(steps = 1e9, bytes = 2e9)]",
+                     #[rest_state(zero_force)], #[even], #[uncompensated], #[vertex] and \
+                     #[limits(steps = 1e9, bytes = 2e9)]",
                 )));
             }
         }

@@ -239,10 +239,11 @@ impl<'a> Parser<'a> {
         while self.take("#") {
             self.attribute(&mut attributes)?;
         }
-        let Attributes { docs, audit_samples, audit_scope, properties, uncompensated, limits } = attributes;
+        let Attributes { docs, audit_samples, audit_scope, properties, uncompensated, vertices, limits } = attributes;
         let uncompensated_prefix = if uncompensated { "#[uncompensated] " } else { "" };
         let limits_prefix = limits.map_or_else(String::new, |limits| format!("{} ", limits.attribute()));
-        let prefix = &format!("{}{uncompensated_prefix}{limits_prefix}", audit_scope.attribute());
+        let vertex_prefix = if vertices { "#[vertex] " } else { "" };
+        let prefix = &format!("{}{uncompensated_prefix}{vertex_prefix}{limits_prefix}", audit_scope.attribute());
         let visibility_start = self.at;
         if self.take_word("pub") && self.take("(") {
             while !self.take(")") {
@@ -253,7 +254,8 @@ impl<'a> Parser<'a> {
             }
         }
         let visibility = tokens::text(&self.tokens[visibility_start..self.at]);
-        let claims = audit_samples.is_some() || uncompensated || limits.is_some() || !properties.is_empty();
+        let claims =
+            audit_samples.is_some() || uncompensated || vertices || limits.is_some() || !properties.is_empty();
         if claims && (self.is_word("fn") || self.is_word("const")) {
             return self.fail("a declaration after its attributes (functions and constants have only documentation)");
         }
@@ -278,6 +280,7 @@ impl<'a> Parser<'a> {
                 audit_scope,
                 properties,
                 uncompensated,
+                vertices,
                 limits,
                 kind,
                 name,
@@ -310,6 +313,7 @@ impl<'a> Parser<'a> {
             audit_scope,
             properties,
             uncompensated,
+            vertices,
             limits,
             kind,
             name,

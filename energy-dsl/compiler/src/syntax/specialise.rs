@@ -109,6 +109,7 @@ fn specialised(
     // The original's text follows, so that this declaration comes first.
     let source = format!("{} {}", declaration.source, original.source);
     let uncompensated = declaration.uncompensated || original.uncompensated;
+    let vertices = declaration.vertices || original.vertices;
     let (limits, formula) = (declaration.limits.or(original.limits), original.formula.clone());
-    Some(Declaration { docs, inputs, body, uncompensated, limits, formula, source, ..declaration })
+    Some(Declaration { docs, inputs, body, uncompensated, vertices, limits, formula, source, ..declaration })
 }

@@ -19,6 +19,7 @@ mod real;
 mod recording;
 mod rows;
 mod series;
+mod trace;
 mod unbounded;
 
 pub use block_sum::{BLOCK_NUMBERS, BlockSum};
@@ -32,5 +33,5 @@ pub(crate) use limits::fill_outside;
 pub use limits::{Care, Roles, settle};
 pub use ray::Ray;
 pub use real::{Mask, Number, Real};
-pub(crate) use unbounded::doubles;
-pub use unbounded::{Precautions, Unbounded, WithCare, with_care};
+pub use trace::{MASKS, Trace, TraceStep, elementary_functions};
+pub use unbounded::{GeneralPath, Precautions, Unbounded, WithCare, with_care};

@@ -4,7 +4,7 @@ use std::ops::{Add, BitAnd, BitOr, Div, Mul, Neg, Not, Sub};
 use super::cpu::{Scalar, dispatch_scalar};
 use super::elementary::{Atan2, Binary, Cos, Exp, Ln, ModerateAtan2, Pow, Sin, Unary, sin_cos};
 use super::level::{Baseline, Kernel, Level};
-use super::unbounded::{OnSlices, Unbounded, WithCare, on_slices};
+use super::unbounded::{GeneralPath, Unbounded, WithCare};
 
 /// The outcome of a comparison: a `bool`, or one per lane.
 pub trait Mask: Copy + Debug + BitAnd<Output = Self> + BitOr<Output = Self> + Not<Output = Self> {
@@ -170,11 +170,6 @@ pub trait Number:
     fn extended(&self) -> Option<Unbounded<f64>> {
         None
     }
-    /// Returns the nearest double; `None` if the type has more digits than that or is not a plain number.
-    #[doc(hidden)]
-    fn double(&self) -> Option<f64> {
-        None
-    }
     /// Returns the number nearest to one with an extended exponent. Only types that are [`Number::extended`] need it.
     #[doc(hidden)]
     #[must_use]
@@ -188,11 +183,11 @@ pub trait Number:
     }
     /// Returns the general path of a routine over this type.
     #[doc(hidden)]
-    fn general_path<W: WithCare<INPUTS, OUTPUTS>, const INPUTS: usize, const OUTPUTS: usize>() -> OnSlices<Self>
+    fn general_path<W: WithCare<INPUTS, OUTPUTS>, const INPUTS: usize, const OUTPUTS: usize>() -> GeneralPath<Self>
     where
         Self: Real,
     {
-        on_slices::<W, Self, INPUTS, OUTPUTS>
+        GeneralPath::of::<W, INPUTS, OUTPUTS>()
     }
     /// Runs a kernel over this type at the level that suits it: the best level of the machine for `f64` and `f32`.
     fn dispatch<K: Kernel>(kernel: K) -> K::Output {

@@ -4,7 +4,7 @@ use std::ops::{Add, Div, Mul, Neg, Sub};
 
 use super::cpu::{Fused, Scalar};
 use super::flags::Flags;
-use super::level::{Baseline, Level};
+use super::level::Level;
 use super::limits::{Care, Roles, fill_outside, settle};
 use super::ray::Ray;
 use super::real::{Mask, Number, Real};
@@ -124,17 +124,12 @@ impl<S: Scalar> Unbounded<S> {
         Self::new(a.mul_add::<L>(b, c * S::power_of_two(shift.max(-S::REACH))), exponent)
     }
 
-    /// Creates the result of a function that was evaluated in double precision. Beyond the range of the type it need
-    /// not be exact to the last bit.
-    fn by_double(significand: f64, exponent: i32) -> Self {
-        let double = Unbounded::<f64>::new(significand, exponent);
-        let (significand, exponent) = double.split();
-        Self::new(S::nearest(significand), exponent)
-    }
-
-    fn to_double(self) -> (f64, i32) {
-        let (significand, exponent) = self.split();
-        (significand.to_f64(), exponent)
+    /// Returns ln 2 in two parts.
+    fn ln_2() -> (S, S) {
+        // What the nearest double lacks.
+        const REST: f64 = 2.319_046_813_846_299_6e-17;
+        let high = S::nearest(std::f64::consts::LN_2);
+        (high, S::nearest((std::f64::consts::LN_2 - high.to_f64()) + REST))
     }
 }
 
@@ -218,20 +213,20 @@ impl<S: Scalar> Number for Unbounded<S> {
         if is_normal || !self.is_plain() || self.split().1 > 24 {
             return Self::new(result, 0);
         }
-        // eˣ = 2ᵏ e^(x − k ln 2). ln 2 is split in two; the first part has so few bits that k times it is exact.
-        const HIGH: f64 = 0.693_147_180_369_123_8;
-        const LOW: f64 = 1.908_214_929_270_587_7e-10;
-        let x = plain.to_f64();
-        let k = (x / std::f64::consts::LN_2).round();
-        Self::by_double(Number::exp::<L>((x - k * HIGH) - k * LOW), k as i32)
+        // eˣ = 2ᵏ e^(x − k ln 2)
+        let (high, low) = Self::ln_2();
+        let k = (plain * S::nearest(std::f64::consts::LOG2_E)).round();
+        let rest = ((plain - k * high) - k.product_error::<L>(high)) - k * low;
+        Self::new(rest.exp::<L>(), k.to_f64() as i32)
     }
     #[inline(never)]
     fn ln<L: Level>(self) -> Self {
         if !self.is_plain() || self.fits() {
             return Self::new(self.to_scalar().ln::<L>(), 0);
         }
-        let (significand, exponent) = self.to_double();
-        Self::by_double(Number::ln::<L>(significand) + f64::from(exponent) * std::f64::consts::LN_2, 0)
+        let (significand, exponent) = self.split();
+        let ((high, low), k) = (Self::ln_2(), S::nearest(f64::from(exponent)));
+        Self::new(k * high + (significand.ln::<L>() + (k.product_error::<L>(high) + k * low)), 0)
     }
     #[inline(never)]
     fn atan2<L: Level>(self, x: Self) -> Self {
@@ -244,20 +239,22 @@ impl<S: Scalar> Number for Unbounded<S> {
     #[inline(never)]
     fn powf<L: Level>(self, exponent: Self) -> Self {
         let power = exponent.to_scalar();
-        let (_, own) = self.split();
-        let estimate = f64::from(own) * power.to_f64();
-        let within = f64::from(S::FIRST + 2) < estimate - power.to_f64().abs()
-            && estimate + power.to_f64().abs() < f64::from(S::LAST - 1);
+        let (significand, own) = self.split();
+        let own = S::nearest(f64::from(own));
+        let (first, last) = (S::nearest(f64::from(S::FIRST + 2)), S::nearest(f64::from(S::LAST - 1)));
+        let (estimate, doubt) = (own * power, power.abs());
+        let within = first < estimate - doubt && estimate + doubt < last;
         if !self.is_plain() || (self.fits() && within) {
             return Self::new(self.to_scalar().powf::<L>(power), 0);
         }
-        // (m 2ᵉ)ᵖ = mᵖ 2^(frac eᵖ) 2^(whole eᵖ).
-        let (significand, own) = self.to_double();
-        let power = power.to_f64();
-        let whole = (f64::from(own) * power).round();
-        let fraction = f64::from(own).mul_add(power, -whole);
-        let significand = Number::powf::<L>(significand, power) * Number::powf::<L>(2.0, fraction);
-        Self::by_double(significand, whole as i32)
+        // (m 2ᵉ)ᵖ = mᵖ 2^(frac eᵖ) 2^(whole eᵖ). The first factor may be large or small, too: then it loses some digits.
+        let whole = estimate.round();
+        let fraction = own.fused_mul_sub::<L>(power, whole);
+        let of_significand = match doubt < last {
+            true => Self::of(significand.powf::<L>(power)),
+            false => Self::of(significand.ln::<L>() * power).exp::<L>(),
+        };
+        of_significand * Self::new(S::nearest(2.0).powf::<L>(fraction), whole.to_f64() as i32)
     }
     #[inline(never)]
     fn mul_add<L: Level>(self, factor: Self, addend: Self) -> Self {
@@ -314,15 +311,12 @@ impl<S: Scalar> Number for Unbounded<S> {
         if mask { yes } else { no }
     }
     fn extended(&self) -> Option<Unbounded<f64>> {
-        let (significand, exponent) = self.to_double();
-        Some(Unbounded::new(significand, exponent))
-    }
-    fn double(&self) -> Option<f64> {
-        Some(if self.exponent == 0 { self.significand.to_f64() } else { self.to_scalar().to_f64() })
+        let (significand, exponent) = self.split();
+        Some(Unbounded::new(significand.to_f64(), exponent))
     }
     fn of_extended(value: Unbounded<f64>) -> Self {
         let (significand, exponent) = value.split();
-        Self::by_double(significand, exponent)
+        Self::new(S::nearest(significand), exponent)
     }
     fn is_representable(&self) -> bool {
         self.to_scalar().abs() < S::INFINITY
@@ -334,7 +328,7 @@ impl<S: Scalar> Number for Unbounded<S> {
         let large = S::power_of_two(S::LAST - 8);
         Self::of(if S::default() < self.significand { large } else { -large })
     }
-    fn general_path<W: WithCare<INPUTS, OUTPUTS>, const INPUTS: usize, const OUTPUTS: usize>() -> OnSlices<Self> {
+    fn general_path<W: WithCare<INPUTS, OUTPUTS>, const INPUTS: usize, const OUTPUTS: usize>() -> GeneralPath<Self> {
         S::unbounded_path::<W, INPUTS, OUTPUTS>()
     }
 }
@@ -367,9 +361,8 @@ pub trait WithCare<const INPUTS: usize, const OUTPUTS: usize> {
 #[doc(hidden)]
 #[derive(Debug)]
 pub struct Precautions<const INPUTS: usize, const OUTPUTS: usize> {
-    pub(crate) double: OnSlices<Unbounded<f64>>,
+    pub(crate) double: GeneralPath<Unbounded<f64>>,
     ray: OnSlices<Ray>,
-    is_outside: fn(&[f64]) -> bool,
 }
 
 impl<const INPUTS: usize, const OUTPUTS: usize> Precautions<INPUTS, OUTPUTS> {
@@ -377,19 +370,34 @@ impl<const INPUTS: usize, const OUTPUTS: usize> Precautions<INPUTS, OUTPUTS> {
     #[must_use]
     pub const fn of<W: WithCare<INPUTS, OUTPUTS>>() -> Self {
         Self {
-            double: on_slices::<W, Unbounded<f64>, INPUTS, OUTPUTS>,
+            double: GeneralPath::of::<W, INPUTS, OUTPUTS>(),
             ray: on_slices::<W, Ray, INPUTS, OUTPUTS>,
-            is_outside: |inputs| W::is_outside_at::<f64, Baseline>(array(inputs)),
         }
     }
 }
 
-/// The general path of a routine: writes the results at some inputs. With slices, the code that calls it is the same
-/// for all routines.
+/// Writes the results of a routine at some inputs. With slices, the code that calls it is the same for all routines.
 pub type OnSlices<T> = fn(&[T], &mut [T]) -> Care<T>;
 
+/// The general path of a routine.
+#[derive(Clone, Copy, Debug)]
+pub struct GeneralPath<T: Number> {
+    pub(crate) run: OnSlices<T>,
+    /// Whether an input is outside of the formula's domain. The path says so, too; this is quicker.
+    pub(crate) is_outside: fn(&[T]) -> bool,
+}
+
+impl<T: Real> GeneralPath<T> {
+    pub(crate) const fn of<W: WithCare<INPUTS, OUTPUTS>, const INPUTS: usize, const OUTPUTS: usize>() -> Self {
+        Self {
+            run: on_slices::<W, T, INPUTS, OUTPUTS>,
+            is_outside: |inputs| W::is_outside_at::<T, Fused>(array(inputs)).any(),
+        }
+    }
+}
+
 /// Runs the general path of a routine.
-pub(crate) fn on_slices<W: WithCare<INPUTS, OUTPUTS>, T: Real, const INPUTS: usize, const OUTPUTS: usize>(
+fn on_slices<W: WithCare<INPUTS, OUTPUTS>, T: Real, const INPUTS: usize, const OUTPUTS: usize>(
     inputs: &[T],
     results: &mut [T],
 ) -> Care<T> {
@@ -415,8 +423,8 @@ pub fn with_care<W: WithCare<INPUTS, OUTPUTS>, T: Real, const INPUTS: usize, con
     summed: usize,
 ) -> ([T; OUTPUTS], Flags<T>) {
     let mut outputs = [T::from_f64(0.0); OUTPUTS];
-    let &Precautions { ray, is_outside, .. } = W::compiled();
-    let path = Path { roles: W::ROLES, run: T::Unbounded::general_path::<W, INPUTS, OUTPUTS>(), ray, is_outside };
+    let (ray, own) = (W::compiled().ray, T::Unbounded::general_path::<W, INPUTS, OUTPUTS>());
+    let path = Path { roles: W::ROLES, own, ray };
     let flags = in_lanes(inputs, extraordinary, summed, &mut outputs, &path);
     (outputs, flags)
 }
@@ -424,9 +432,8 @@ pub fn with_care<W: WithCare<INPUTS, OUTPUTS>, T: Real, const INPUTS: usize, con
 /// The general path of a routine.
 struct Path<T: Number> {
     roles: Roles<'static>,
-    run: OnSlices<T>,
+    own: GeneralPath<T>,
     ray: OnSlices<Ray>,
-    is_outside: fn(&[f64]) -> bool,
 }
 
 /// Runs a path in some lanes. It is compiled once for a type of lanes, not once for a routine: it is more code than the
@@ -460,12 +467,11 @@ fn in_lanes<T: Real>(
 impl<T: Real> Path<T> {
     /// Writes the results at one input.
     fn of_one(&self, inputs: &[T], results: &mut [T]) -> Flags<T> {
-        let mut plain = vec![0.0; inputs.len()];
-        if doubles(inputs, &mut plain) && (self.is_outside)(&plain) {
+        if (self.own.is_outside)(inputs) {
             fill_outside(self.roles, results);
             return Flags::degenerate();
         }
-        let care = (self.run)(inputs, results);
+        let care = (self.own.run)(inputs, results);
         let outputs = results.len();
         let along = |rays: &[Ray]| {
             let mut results = vec![Ray::from_f64(0.0); outputs];
@@ -474,11 +480,6 @@ impl<T: Real> Path<T> {
         };
         settle(inputs, self.roles, results, care, &along)
     }
-}
-
-/// Writes the nearest doubles. Returns whether the type has them.
-pub(crate) fn doubles<T: Number>(numbers: &[T], nearest: &mut [f64]) -> bool {
-    nearest.iter_mut().zip(numbers).all(|(nearest, number)| number.double().map(|double| *nearest = double).is_some())
 }
 
 #[cfg(test)]

@@ -3,7 +3,7 @@
 use super::instruction::Tape;
 use super::scalar::Values;
 use crate::RoutineKind;
-use crate::numbers::{Baseline, Care, Flags, Fused, Level, Mask, Number, Ray, Roles, doubles, fill_outside, settle};
+use crate::numbers::{Care, Flags, Fused, Level, Mask, Number, Ray, Roles, fill_outside, settle};
 
 /// The source of an input number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -149,10 +149,8 @@ impl General {
 
     /// Returns all results, and whether they are limits.
     fn settled<T: Number>(&self, inputs: &[T], roles: Roles<'_>) -> (Vec<T>, Flags<T>) {
-        let is_outside = |(tape, slot): &(Tape, u16)| {
-            let mut plain = vec![0.0; inputs.len()];
-            doubles(inputs, &mut plain) && tape.run::<f64, Baseline>(plain).mask(Some(*slot))
-        };
+        let is_outside =
+            |(tape, slot): &(Tape, u16)| tape.run::<T, Fused>(inputs.iter().cloned()).mask(Some(*slot)).any();
         if self.outside.as_ref().is_some_and(is_outside) {
             let mut results = vec![T::from_f64(0.0); self.results.len()];
             fill_outside(roles, &mut results);

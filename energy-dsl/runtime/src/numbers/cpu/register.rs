@@ -5,7 +5,7 @@ use crate::numbers::elementary::Format;
 use crate::numbers::lane::{Lane, check_transposed, gather_by_element, transpose_by_element};
 use crate::numbers::level::Kernel;
 use crate::numbers::real::{Mask, Number};
-use crate::numbers::unbounded::{OnSlices, Unbounded, WithCare, on_slices};
+use crate::numbers::unbounded::{GeneralPath, Unbounded, WithCare};
 
 /// A floating-point number that lanes are made of, with the bit patterns of its format.
 pub trait Scalar: Lane<Self> + Number<Mask = bool> + PartialOrd + Default {
@@ -36,6 +36,8 @@ pub trait Scalar: Lane<Self> + Number<Mask = bool> + PartialOrd + Default {
     fn nearest(value: f64) -> Self;
     /// Converts to double precision.
     fn to_f64(self) -> f64;
+    /// Returns the nearest integer; of two, the one further from 0.
+    fn round(self) -> Self;
     /// Returns ⌊log₂|self|⌋ of a normal number.
     fn exponent(self) -> i32;
     /// Returns 2^exponent, a normal number.
@@ -44,7 +46,7 @@ pub trait Scalar: Lane<Self> + Number<Mask = bool> + PartialOrd + Default {
     fn moderate_bounds(degree: u8) -> (Self, Self);
     /// Returns the general path of a routine in this precision.
     fn unbounded_path<W: WithCare<INPUTS, OUTPUTS>, const INPUTS: usize, const OUTPUTS: usize>()
-    -> OnSlices<Unbounded<Self>>;
+    -> GeneralPath<Unbounded<Self>>;
 }
 
 macro_rules! scalar {
@@ -74,6 +76,10 @@ macro_rules! scalar {
                 f64::from(self)
             }
             #[inline(always)]
+            fn round(self) -> Self {
+                $float::round(self)
+            }
+            #[inline(always)]
             fn exponent(self) -> i32 {
                 ((self.to_bits() << 1) >> ($mantissa_bits + 1)) as i32 - $bias
             }
@@ -88,7 +94,7 @@ macro_rules! scalar {
                 (power($bias - limit), power($bias + limit))
             }
             fn unbounded_path<W: WithCare<INPUTS, OUTPUTS>, const INPUTS: usize, const OUTPUTS: usize>()
-            -> OnSlices<Unbounded<Self>> {
+            -> GeneralPath<Unbounded<Self>> {
                 $general_path
             }
         }
@@ -107,7 +113,7 @@ scalar!(
     340_282_366_920_938_463_463_374_607_431_768_211_456.0,
     500
 );
-scalar!(f32, u32, on_slices::<W, _, INPUTS, OUTPUTS>, 23, 127, 4097.0, 12, 16.0, 95);
+scalar!(f32, u32, GeneralPath::of::<W, INPUTS, OUTPUTS>(), 23, 127, 4097.0, 12, 16.0, 95);
 
 /// A register of numbers. If it needs processor features, it is used only in kernels that run at the level of the
 /// register.

@@ -1,9 +1,10 @@
 //! Reduction of angles of any size by the method of Payne and Hanek. Of the product with 2/π, only the bits around the
 //! binary point are computed, in integers.
 
-use super::{Format, fast_sum};
+use super::{Bits, Format, fast_sum};
 use crate::numbers::cpu::Scalar;
 use crate::numbers::level::Baseline;
+use crate::numbers::real::Mask;
 
 /// The leading bits of 2/π.
 const TWO_OVER_PI: [u64; 20] = [
@@ -39,10 +40,23 @@ const TWO_OVER_PI_SINGLE: [u32; 8] =
 /// π/2 in two parts.
 const HALF_PI_SINGLE: (f32, f32) = (std::f32::consts::FRAC_PI_2, -4.371_139e-8);
 
+/// Replaces quadrants and remainders in the marked lanes.
+#[inline(always)]
+pub fn reduced<D: Bits>(x: D, huge: D::Mask, reduced: [D; 3]) -> [D; 3] {
+    // The widest register has 16 lanes.
+    let (mut angles, mut parts) = ([D::Format::default(); 16], [[D::Format::default(); 16]; 3]);
+    x.store(&mut angles);
+    for (part, of) in parts.iter_mut().zip(reduced) {
+        of.store(part);
+    }
+    reduce(&angles[..D::LANES], huge.bits(), &mut parts);
+    parts.map(|part| D::load(&part))
+}
+
 /// Reduces the marked angles. Writes the quadrant (in the low bits), and the high and low part of the remainder.
 #[cold]
 #[inline(never)]
-pub fn reduce<S: Format>(angles: &[S], marked: u32, parts: &mut [[S; 16]; 3]) {
+fn reduce<S: Format>(angles: &[S], marked: u32, parts: &mut [[S; 16]; 3]) {
     for (lane, &angle) in angles.iter().enumerate().filter(|(lane, _)| marked >> lane & 1 != 0) {
         let nan = S::from_f64(f64::NAN);
         let reduced = if angle < S::INFINITY { angle.reduce_huge() } else { [S::ROUND, nan, nan] };

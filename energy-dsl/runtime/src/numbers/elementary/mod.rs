@@ -36,7 +36,7 @@ use trigonometry::Trigonometry;
 use super::cpu::Scalar;
 use super::lane::Lane;
 use super::level::Level;
-use super::real::Number;
+use super::real::{Mask, Number};
 
 /// A floating-point format with the constants of its elementary functions.
 pub trait Format: Scalar + Trigonometry + Exponential + Logarithm + ArcTangent + Power {
@@ -87,6 +87,12 @@ pub trait Bits: Lane<<Self as Bits>::Format> {
     fn exponent_to_low_bits(self) -> Self;
     /// Moves bit 1 (of value 2) to the sign position and clears the others.
     fn bit_1_to_sign(self) -> Self;
+
+    /// Reduces the marked lanes of some angles, which are huge. `reduced` has the quadrants and remainders of the others.
+    #[inline(always)]
+    fn reduced_if_huge(self, huge: Self::Mask, reduced: [Self; 3]) -> [Self; 3] {
+        if huge.any() { huge_angle::reduced(self, huge, reduced) } else { reduced }
+    }
 
     /// Returns the sign bit alone.
     #[inline(always)]

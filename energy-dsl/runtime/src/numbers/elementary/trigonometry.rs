@@ -1,7 +1,6 @@
 use super::{Bits, Format, Unary, fast_sum, horner, huge_angle, polynomial};
 use crate::numbers::cpu::Scalar;
 use crate::numbers::level::Level;
-use crate::numbers::real::Mask;
 
 /// The sine.
 pub struct Sin;
@@ -121,22 +120,8 @@ fn reduce<D: Bits, L: Level>(x: D) -> Reduced<D> {
     let round = D::splat(D::Format::ROUND);
     let quadrant = x.mul_add::<L>(D::splat(D::Format::FRAC_2_PI), round);
     let (high, low) = D::Format::remainder::<D, L>(x, quadrant - round);
-    let reduced = Reduced { quadrant, high, low };
     let huge = !x.less(D::splat(D::Format::HUGE));
-    if huge.any() { reduce_huge(x, huge, reduced) } else { reduced }
-}
-
-/// Replaces the results of the marked lanes.
-#[inline(always)]
-fn reduce_huge<D: Bits>(x: D, huge: D::Mask, Reduced { quadrant, high, low }: Reduced<D>) -> Reduced<D> {
-    // The widest register has 16 lanes.
-    let (mut angles, mut parts) = ([D::Format::default(); 16], [[D::Format::default(); 16]; 3]);
-    x.store(&mut angles);
-    for (part, of) in parts.iter_mut().zip([quadrant, high, low]) {
-        of.store(part);
-    }
-    huge_angle::reduce(&angles[..D::LANES], huge.bits(), &mut parts);
-    let [quadrant, high, low] = parts.map(|part| D::load(&part));
+    let [quadrant, high, low] = x.reduced_if_huge(huge, [quadrant, high, low]);
     Reduced { quadrant, high, low }
 }
 

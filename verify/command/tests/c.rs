@@ -1,0 +1,257 @@
+//! Generated C has the bits of the tape, and so of generated Rust: on every reference record, at every degenerate input.
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use energy_compiler::{Budget, Interpreted, Precision, Target, sources};
+use energy_dsl::{Flags, Float, Inputs, Kind, Number, RoutineKind};
+use verify::sample::{Sample, Sampler};
+use verify_command::catalogue;
+use verify_command::reference::{Record, mapping};
+use verify_command::stress::sweeps;
+
+/// A compiler of C or C++, with the options that all code must compile with.
+struct Compiler {
+    command: &'static [&'static str],
+}
+
+const OPTIONS: [&str; 7] = ["-Wall", "-Wextra", "-pedantic", "-Wconversion", "-Werror", "-ffp-contract=off", "-O1"];
+
+/// Returns whether a program can be run.
+fn exists(program: &str) -> bool {
+    Command::new(program).arg("--version").output().is_ok_and(|output| output.status.success())
+}
+
+/// A float with its bits.
+trait Bits: Float + Number<Mask = bool> {
+    const PRECISION: Precision;
+    fn bytes(self) -> Vec<u8>;
+    fn read(bytes: &[u8]) -> (Self, &[u8]);
+    fn same(self, other: Self) -> bool;
+    fn of(value: f64) -> Self;
+}
+
+macro_rules! bits {
+    ($float:ident, $precision:ident) => {
+        impl Bits for $float {
+            const PRECISION: Precision = Precision::$precision;
+            fn bytes(self) -> Vec<u8> {
+                self.to_le_bytes().to_vec()
+            }
+            fn read(bytes: &[u8]) -> (Self, &[u8]) {
+                let (number, rest) = bytes.split_first_chunk().expect("the program writes all results");
+                (Self::from_le_bytes(*number), rest)
+            }
+            fn same(self, other: Self) -> bool {
+                self.to_bits() == other.to_bits() || self.is_nan() && other.is_nan()
+            }
+            fn of(value: f64) -> Self {
+                value as Self
+            }
+        }
+    };
+}
+
+bits!(f64, Double);
+bits!(f32, Single);
+
+/// Ordinary inputs, inputs on a lattice, inputs with zeros, coincidences and extreme sizes, sweeps to every singularity.
+fn samples(declaration: &'static energy_dsl::Declaration) -> Vec<Sample> {
+    let mut sampler = Sampler::new(declaration, 17);
+    let mut list: Vec<Sample> = (0..8).map(|_| sampler.sample()).collect();
+    list.extend((0..8).map(|_| sampler.lattice_sample()));
+    list.extend((0..16).map(|_| sampler.odd_sample()));
+    list.extend(sweeps(declaration).into_iter().flat_map(|sweep| sweep.inputs).map(|(_, sample)| sample));
+    list
+}
+
+/// The inputs of one element.
+struct Case<S> {
+    element: usize,
+    parameters: Vec<S>,
+    rest: Vec<S>,
+    positions: Vec<S>,
+    velocities: Vec<S>,
+}
+
+impl<S: Bits> Case<S> {
+    fn new(element: usize, of: &Interpreted, sample: &Sample) -> Self {
+        let numbers = |list: &[f64]| list.iter().map(|&x| S::of(x)).collect::<Vec<S>>();
+        let mut velocities = numbers(&sample.velocities);
+        velocities.resize(of.coordinates(), S::of(0.0));
+        let [parameters, rest, positions] = [&sample.parameters, &sample.rest, &sample.positions].map(|list| numbers(list));
+        Self { element, parameters, rest, positions, velocities }
+    }
+
+    fn bytes(&self) -> Vec<u8> {
+        let mut bytes = u32::try_from(self.element).unwrap().to_le_bytes().to_vec();
+        let Self { parameters, rest, positions, velocities, .. } = self;
+        bytes.extend([rest, parameters, positions, velocities].into_iter().flatten().flat_map(|x| x.bytes()));
+        bytes
+    }
+
+    fn inputs(&self) -> Inputs<'_, S> {
+        let Self { parameters, rest, positions, velocities, .. } = self;
+        Inputs { parameters, rest, positions, velocities }
+    }
+}
+
+fn folder(name: &str) -> PathBuf {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
+    std::fs::create_dir_all(&folder).unwrap();
+    folder
+}
+
+/// Compiles all elements to a program.
+fn compiled(compiler: &Compiler, elements: &[Interpreted], precision: Precision, folder: &Path) -> PathBuf {
+    let files = sources(elements, Target::C, precision);
+    let mut all = String::new();
+    let mut names = Vec::new();
+    for file in &files {
+        std::fs::write(folder.join(&file.name), &file.text).unwrap();
+        if let Some(name) = file.name.strip_suffix(".c") {
+            all.push_str(&format!("#include \"{}\"\n", file.name));
+            names.push(format!("&{name}"));
+        }
+    }
+    let (real, suffix) = match precision {
+        Precision::Double => ("double", "f64"),
+        Precision::Single => ("float", "f32"),
+    };
+    all.push_str(&format!(
+        "#define REAL {real}\n#define ELEMENT energy_{suffix}_element\n#define energy_arithmetic \
+         energy_{suffix}_arithmetic_is_exact\nstatic const ELEMENT *const elements[] = {{{}}};\n",
+        names.join(", ")
+    ));
+    std::fs::write(folder.join("elements.h"), all).unwrap();
+    let driver = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/driver.c");
+    let program = folder.join("program");
+    let output = Command::new(compiler.command[0])
+        .args(&compiler.command[1..])
+        .args(OPTIONS)
+        .arg("-I")
+        .arg(folder)
+        .arg(driver)
+        .arg("-o")
+        .arg(&program)
+        .arg("-lm")
+        .output()
+        .unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    program
+}
+
+/// Numbers of what was compared.
+#[derive(Debug, Default)]
+struct Counts {
+    routines: usize,
+    flagged: usize,
+    unsettled: usize,
+}
+
+fn compare<S: Bits>(elements: &[Interpreted], cases: &[Case<S>], mut found: &[u8]) -> Counts {
+    let mut counts = Counts::default();
+    let mut flags = |found: &mut &[u8]| {
+        let (flags, rest) = found.split_first_chunk().expect("the program writes all flags");
+        *found = rest;
+        u32::from_le_bytes(*flags)
+    };
+    for case in cases {
+        let element = &elements[case.element];
+        let name = &*element.declaration().name;
+        let is_degenerate = flags(&mut found) != 0;
+        let expected = element.evaluate(&case.inputs());
+        assert_eq!(expected.is_err(), is_degenerate, "{name}: the rest shape");
+        if is_degenerate {
+            continue;
+        }
+        let vertices = (0..u8::MAX).map(RoutineKind::Vertex).take(element.coordinates() / 3);
+        for kind in RoutineKind::ALL.into_iter().skip(1).chain(vertices) {
+            let Some((groups, expected)) = element.routine::<S>(kind.name(), &case.inputs()).unwrap() else { continue };
+            let flags = flags(&mut found);
+            let Flags { degenerate, kink } = expected;
+            let is_unsettled = flags & 4 != 0;
+            counts.routines += 1;
+            counts.flagged += usize::from(flags != 0);
+            counts.unsettled += usize::from(is_unsettled);
+            let place = format!("{name}, {}: positions {:?}", kind.name(), case.positions);
+            assert!(is_unsettled || (flags & 1 != 0, flags & 2 != 0) == (degenerate, kink), "{place}: flags {flags}");
+            for (number, expected) in groups.concat().into_iter().enumerate() {
+                let (result, rest) = S::read(found);
+                found = rest;
+                assert!(
+                    is_unsettled || result.same(expected),
+                    "{place}, number {number}: {result:?} for {expected:?}, parameters {:?}, rest {:?}",
+                    case.parameters,
+                    case.rest
+                );
+            }
+        }
+    }
+    assert!(found.is_empty());
+    counts
+}
+
+fn interpreted(declaration: &energy_dsl::Declaration) -> Interpreted {
+    let text = &declaration.source;
+    let elements = Interpreted::from_file_with_vertices(text, "element", &Budget::default()).expect("it compiles");
+    elements.into_iter().next_back().expect("it declares the element")
+}
+
+/// All samples of all elements, and all reference records.
+fn cases<S: Bits>(elements: &[Interpreted]) -> Vec<Case<S>> {
+    let mut cases = Vec::new();
+    for (number, entry) in catalogue::elements().iter().enumerate() {
+        cases.extend(samples(entry.declaration).iter().map(|sample| Case::new(number, &elements[number], sample)));
+    }
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../data/potentials");
+    for file in std::fs::read_dir(folder).unwrap() {
+        let path = file.unwrap().path();
+        if path.extension().is_none_or(|extension| extension != "json") {
+            continue;
+        }
+        let file: serde_json::Value = serde_json::from_str(&std::fs::read_to_string(&path).unwrap()).unwrap();
+        let Some(mapping) = file["potential"].as_str().and_then(mapping) else { continue };
+        let declared = &mapping.entry.declaration.name;
+        let number = catalogue::elements().iter().position(|entry| entry.declaration.name == *declared).unwrap();
+        for record in file["records"].as_array().unwrap() {
+            let record: Record = serde_json::from_value(record.clone()).unwrap();
+            cases.push(Case::new(number, &elements[number], &record.sample(&mapping).unwrap()));
+        }
+    }
+    cases
+}
+
+fn check<S: Bits>(compiler: &Compiler, name: &str) {
+    if !exists(compiler.command[0]) {
+        println!("skipped: there is no {}", compiler.command[0]);
+        return;
+    }
+    if energy_dsl::level() == energy_dsl::LevelName::Baseline && cfg!(target_arch = "x86_64") {
+        println!("skipped: this processor has no fused operations");
+        return;
+    }
+    let elements: Vec<Interpreted> =
+        catalogue::elements().iter().map(|entry| interpreted(entry.declaration)).collect();
+    let folder = folder(name);
+    let program = compiled(compiler, &elements, S::PRECISION, &folder);
+    let cases = cases::<S>(&elements);
+    let records = folder.join("records");
+    std::fs::write(&records, cases.iter().flat_map(Case::bytes).collect::<Vec<u8>>()).unwrap();
+    let output = Command::new(program).arg(&records).output().unwrap();
+    assert!(output.status.success(), "{}", output.status);
+    let counts = compare(&elements, &cases, &output.stdout);
+    println!("{name}: {} inputs, {counts:?}", cases.len());
+    assert!(counts.unsettled * 4 < counts.routines, "{counts:?}");
+    assert!(counts.routines > 10_000 && elements.iter().any(|e| e.declaration().kind == Kind::Residual));
+}
+
+#[test]
+fn c_has_the_bits_of_rust() {
+    check::<f64>(&Compiler { command: &["gcc", "-std=c99"] }, "c-f64");
+}
+
+#[test]
+fn c_in_single_precision_has_the_bits_of_rust() {
+    check::<f32>(&Compiler { command: &["gcc", "-std=c99"] }, "c-f32");
+}
