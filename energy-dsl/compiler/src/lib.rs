@@ -30,7 +30,7 @@ mod tape;
 pub use budget::{Budget, Limits, Phase, Progress};
 pub use check::unit_exponents;
 pub use diagnostic::{Diagnostic, Diagnostics};
-pub use emit_c::{Precision, SourceFile, Target, sources};
+pub use emit_c::{Origin, Precision, SourceError, SourceFile, Target, origin, sources};
 pub use functions::{Function, all as functions, robust_spellings};
 pub use inspect::{Fault, Listing, Mutation, Part, Parts, Path, Textbook, mathml};
 pub use interpreted::{BindError, Elements, EvaluateError, InputKind, InputNumbers, Interpreted, Layouts};

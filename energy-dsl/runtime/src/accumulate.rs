@@ -1,7 +1,7 @@
 use crate::array::Array;
 use crate::element::Vector3;
 use crate::numbers::{Flags, Real};
-use crate::results::{Gradient, HessianVector, ReducedHessian, Value};
+use crate::results::{Gradient, HessianVector, ReducedHessian, Value, Vertex};
 
 /// Sums the results of like terms.
 #[doc(hidden)]
@@ -123,3 +123,4 @@ accumulate!(Value<T> { value: number });
 accumulate!(Gradient<T, P: Vector3> { value: number, gradient: vectors });
 accumulate!(HessianVector<T, P: Vector3> { product: vectors });
 accumulate!(ReducedHessian<T, Q: Number, H: Number> { value: number, gradient: numbers, hessian: numbers });
+accumulate!(Vertex<T> { value: number, gradient: numbers, block: vectors });

@@ -4,7 +4,7 @@ use crate::numbers::Flags;
 use crate::numbers::Real;
 use crate::results::{
     ConstraintHessian, ConstraintJacobian, ForceJacobians, ForceValue, Gradient, Hessian, HessianVector,
-    ReducedHessian, ResidualJacobian, ResidualValue, Value,
+    ReducedHessian, ResidualJacobian, ResidualValue, Value, Vertex,
 };
 
 /// Selects between two results, lane by lane.
@@ -63,5 +63,6 @@ choose!(ForceValue<T, P: Vector3> { force: vectors });
 choose!(ForceJacobians<T, P: Vector3, S: Block> { force: vectors, by_position: blocks, by_velocity: blocks });
 choose!(ConstraintJacobian<T, R: Number, J: Vector3> { value: numbers, jacobian: vectors });
 choose!(ConstraintHessian<T, R: Number, J: Vector3, H: Block> { value: numbers, jacobian: vectors, hessians: blocks });
+choose!(Vertex<T> { value: number, gradient: numbers, block: vectors });
 choose!(ResidualValue<T, R: Number> { value: numbers });
 choose!(ResidualJacobian<T, R: Number, J: Number> { value: numbers, jacobian: numbers });

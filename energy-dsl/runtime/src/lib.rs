@@ -30,12 +30,12 @@ pub use choose::Choose;
 pub use declaration::{Declaration, Field, Kind, OperationCount, Property, Routine, WeightedPoints};
 pub use element::{
     AnyElement, Block, Constraint, Element, ForceLaw, Inputs, Outputs, Potential, ReducedPotential, Residual,
-    RestError, Vector3, triangle_index,
+    RestError, Vector3, VertexPotential, triangle_index,
 };
 #[doc(hidden)]
 pub use element::{
     ConstraintHessianCall, ConstraintJacobianCall, ForceCall, GaussNewtonCall, GradientCall, HessianCall,
-    HessianVectorCall, JacobiansCall, ReducedHessianCall, ResidualCall, ResidualJacobianCall, ValueCall,
+    HessianVectorCall, JacobiansCall, ReducedHessianCall, ResidualCall, ResidualJacobianCall, ValueCall, VertexCall,
 };
 pub use evaluate::{evaluate_constraint, evaluate_force_law, evaluate_potential, evaluate_residual};
 pub use numbers::{
@@ -48,6 +48,6 @@ pub use numbers::{
 };
 pub use results::{
     ConstraintHessian, ConstraintJacobian, ForceJacobians, ForceValue, Gradient, Hessian, HessianVector,
-    ReducedHessian, ResidualJacobian, ResidualValue, Value,
+    ReducedHessian, ResidualJacobian, ResidualValue, Value, Vertex,
 };
 pub use routine::RoutineKind;

@@ -36,6 +36,19 @@ pub struct Hessian<T: Number, Points, Triangle> {
     pub flags: Flags<T>,
 }
 
+/// Value of an energy and its derivatives by one point alone.
+#[derive(Clone, Copy, Debug)]
+pub struct Vertex<T: Number> {
+    /// The energy U.
+    pub value: T,
+    /// ∂U/∂xᵢ.
+    pub gradient: [T; 3],
+    /// ∂²U/∂xᵢ², row by row: the diagonal block of the Hessian, exactly symmetric.
+    pub block: [[T; 3]; 3],
+    /// Flags of this evaluation.
+    pub flags: Flags<T>,
+}
+
 /// The product of a Hessian with a vector.
 #[derive(Clone, Copy, Debug)]
 pub struct HessianVector<T: Number, Points> {

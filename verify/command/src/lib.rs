@@ -19,4 +19,4 @@ pub mod stress;
 
 pub use audit_page::audit_page;
 pub use inputs::read_inputs;
-pub use listings::listings;
+pub use listings::{catalogue_source, listings};

@@ -21,8 +21,16 @@ pub fn listings(name: &str) -> anyhow::Result<Vec<Listing>> {
         anyhow::ensure!(!all.is_empty(), "{name} contains no declaration");
         return Ok(all);
     }
+    Listing::from_source(&catalogue_source(name)?).map_err(|errors| anyhow::anyhow!("{name}:{errors}"))
+}
+
+/// Returns the text of an element of the catalogue.
+///
+/// # Errors
+/// If the element does not exist.
+pub fn catalogue_source(name: &str) -> anyhow::Result<String> {
     let names = || crate::catalogue::elements().iter().map(|e| &*e.declaration.name).collect::<Vec<_>>().join(", ");
     let entry =
         crate::catalogue::find(name).with_context(|| format!("there is no element `{name}`; there are {}", names()))?;
-    Listing::from_source(&entry.declaration.source).map_err(|errors| anyhow::anyhow!("{name}:{errors}"))
+    Ok(entry.declaration.source.clone().into_owned())
 }

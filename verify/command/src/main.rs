@@ -28,6 +28,7 @@ enum Command {
     Stress(cli::Stress),
     Bench(cli::Bench),
     Show(cli::Show),
+    Emit(cli::Emit),
     Eval(cli::Eval),
 }
 
@@ -40,6 +41,7 @@ impl Command {
             Self::Stress(command) => command.run(),
             Self::Bench(command) => command.run(),
             Self::Show(command) => command.run(),
+            Self::Emit(command) => command.run(),
             Self::Eval(command) => command.run(),
         }
     }

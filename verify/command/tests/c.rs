@@ -61,8 +61,40 @@ fn samples(declaration: &'static energy_dsl::Declaration) -> Vec<Sample> {
     let mut list: Vec<Sample> = (0..8).map(|_| sampler.sample()).collect();
     list.extend((0..8).map(|_| sampler.lattice_sample()));
     list.extend((0..16).map(|_| sampler.odd_sample()));
+    let mut random = fastrand::Rng::with_seed(17);
+    let mut hostiles: Vec<Sample> = (0..24).map(|_| sampler.sample()).collect();
+    hostiles.iter_mut().for_each(|sample| hostile(sample, &mut random));
+    list.extend(hostiles);
     list.extend(sweeps(declaration).into_iter().flat_map(|sweep| sweep.inputs).map(|(_, sample)| sample));
     list
+}
+
+/// Makes inputs singular: points that coincide or are in line, numbers that are 0, of any size, infinite or not numbers.
+fn hostile(sample: &mut Sample, random: &mut fastrand::Rng) {
+    let points = sample.positions.len() / 3;
+    for _ in 0..=random.usize(..2) {
+        let (i, j) = (random.usize(..sample.positions.len()), random.usize(..sample.positions.len()));
+        match random.usize(..9) {
+            0 | 1 if points > 1 => sample.positions.copy_within(i / 3 * 3..i / 3 * 3 + 3, j / 3 * 3),
+            2 if points > 2 => {
+                let (a, b, c) = (i / 3 * 3, j / 3 * 3, random.usize(..points) * 3);
+                let weight = [0.5, 2.0, -1.0][random.usize(..3)];
+                for axis in 0..3 {
+                    let [from, to] = [a, b].map(|point| sample.positions[point + axis]);
+                    sample.positions[c + axis] = from + weight * (to - from);
+                }
+            }
+            3 => sample.positions[i] = 0.0,
+            4 => sample.positions.iter_mut().for_each(|x| *x *= 1e160),
+            5 => sample.positions.iter_mut().for_each(|x| *x *= 1e-170),
+            6 => sample.positions[i] = [f64::INFINITY, f64::NAN, 1e300, 5e-324, -0.0][random.usize(..5)],
+            7 if !sample.parameters.is_empty() => {
+                let number = random.usize(..sample.parameters.len());
+                sample.parameters[number] = [0.0, -1.0, 1e200, 1e-200, f64::INFINITY][random.usize(..5)];
+            }
+            _ => sample.positions.iter_mut().for_each(|x| *x = (*x * 2.0).round() / 2.0),
+        }
+    }
 }
 
 /// The inputs of one element.
@@ -104,12 +136,12 @@ fn folder(name: &str) -> PathBuf {
 
 /// Compiles all elements to a program.
 fn compiled(compiler: &Compiler, elements: &[Interpreted], precision: Precision, folder: &Path) -> PathBuf {
-    let files = sources(elements, Target::C, precision);
+    let files = sources(elements, Target::C, &[precision]).unwrap();
     let mut all = String::new();
     let mut names = Vec::new();
     for file in &files {
         std::fs::write(folder.join(&file.name), &file.text).unwrap();
-        if let Some(name) = file.name.strip_suffix(".c") {
+        if let Some(name) = file.name.strip_suffix(".c").filter(|name| !name.ends_with("_lanes")) {
             all.push_str(&format!("#include \"{}\"\n", file.name));
             names.push(format!("&{name}"));
         }
@@ -234,6 +266,8 @@ fn check<S: Bits>(compiler: &Compiler, name: &str) {
     let elements: Vec<Interpreted> =
         catalogue::elements().iter().map(|entry| interpreted(entry.declaration)).collect();
     let folder = folder(name);
+    let text: String = catalogue::elements().iter().map(|entry| format!("{}\n", entry.declaration.source)).collect();
+    std::fs::write(folder.join("elements.energy"), text).unwrap();
     let program = compiled(compiler, &elements, S::PRECISION, &folder);
     let cases = cases::<S>(&elements);
     let records = folder.join("records");

@@ -68,7 +68,9 @@ impl Method {
     /// Returns the type of the returned struct. Its arguments are the number type and those of its arrays; both
     /// Jacobians of a force share theirs.
     fn result_type(&self) -> TokenStream {
-        let has_argument = |field: &&Field| field.shape != Shape::Number && field.name != "by_velocity";
+        let has_argument = |field: &&Field| {
+            field.shape != Shape::Number && field.name != "by_velocity" && self.result != "Vertex"
+        };
         let arrays = self.fields.iter().filter(has_argument).map(|field| &field.field_type);
         let (result, number) = (&self.result, quote!(T));
         let arguments = std::iter::once(&number).chain(arrays);
@@ -148,6 +150,53 @@ pub(super) fn implementation(
             #(#levelled)*
         }
         #general
+    }
+}
+
+/// Emits the routines of single vertices as methods of the type, and the trait that chooses among them; nothing
+/// without them.
+pub(super) fn vertices(emitter: &Emitter<'_>) -> TokenStream {
+    let Emitter { name, program, plan, .. } = emitter;
+    let of_vertex = |routine: &&RoutinePlan| matches!(routine.kind, RoutineKind::Vertex(_));
+    let list: Vec<&RoutinePlan> = plan.routines.iter().filter(of_vertex).collect();
+    if list.is_empty() {
+        return TokenStream::new();
+    }
+    let term = term_of(emitter);
+    let owner = term.as_ref().unwrap_or(name);
+    let methods = list.iter().map(|routine| method(emitter, routine, owner));
+    let (sums, own): (Vec<_>, Vec<_>) =
+        methods.map(|Emitted { plain, levelled, general }| (plain, quote!(#levelled #general))).unzip();
+    let levelled = list.iter().map(|routine| format_ident!("{}_at", routine.kind.name()));
+    let numbers = 0..list.len();
+    let points = array(Shape::Vectors, program.points());
+    let message = format!("{} has {} points", program.name, list.len());
+    quote! {
+        #[allow(unused_variables, unused_parens, clippy::all, clippy::pedantic)]
+        impl<T: ::energy_dsl::Real> #owner<T> {
+            #(#own)*
+        }
+
+        #[allow(unused_variables, unused_parens, clippy::all, clippy::pedantic)]
+        impl<T: ::energy_dsl::Real> #name<T> {
+            #(#sums)*
+        }
+
+        #[allow(clippy::all, clippy::pedantic)]
+        impl<T: ::energy_dsl::Real> ::energy_dsl::VertexPotential<T> for #name<T> {
+            #[inline]
+            fn vertex(&self, point: usize, x: &#points) -> ::energy_dsl::Vertex<T> {
+                T::dispatch(::energy_dsl::VertexCall(self, point, x))
+            }
+
+            #[inline(always)]
+            fn vertex_at<L: ::energy_dsl::Level>(&self, point: usize, x: &#points) -> ::energy_dsl::Vertex<T> {
+                match point {
+                    #(#numbers => self.#levelled::<L>(x),)*
+                    _ => ::core::panic!(#message),
+                }
+            }
+        }
     }
 }
 
@@ -256,14 +305,15 @@ fn method(emitter: &Emitter<'_>, routine: &RoutinePlan, owner: &Ident) -> Emitte
             }
         }
     });
-    let plain = quote! {
-        #[inline]
-        fn #name(#arguments) -> #result_type {
-            T::dispatch(::energy_dsl::#call(self, #(#names),*))
+    let dispatched = (!matches!(routine.kind, RoutineKind::Vertex(_))).then(|| {
+        quote! {
+            #[inline]
+            fn #name(#arguments) -> #result_type {
+                T::dispatch(::energy_dsl::#call(self, #(#names),*))
+            }
         }
-
-        #sum
-    };
+    });
+    let plain = quote!(#dispatched #sum);
     let levelled = quote! {
         #[inline(always)]
         fn #levelled<L: ::energy_dsl::Level>(#arguments) -> #result_type {

@@ -4,7 +4,7 @@ use proc_macro2::TokenStream;
 use quote::quote;
 
 use super::Emitter;
-use super::methods::{array, implementation};
+use super::methods::{array, implementation, vertices};
 use super::statements::arranged;
 use crate::graph::Input;
 use crate::plan::Shape;
@@ -45,8 +45,8 @@ fn potential(emitter: &Emitter<'_>) -> TokenStream {
     };
     let list = [RoutineKind::Value, RoutineKind::Gradient, RoutineKind::HessianVector];
     let potential = implementation(emitter, "Potential", &hessian, &list);
-    let reduced = reduced_potential(emitter);
-    quote!(#potential #reduced)
+    let (reduced, vertices) = (reduced_potential(emitter), vertices(emitter));
+    quote!(#potential #reduced #vertices)
 }
 
 /// Emits the Hessian in reduced coordinates and its expansion to points.

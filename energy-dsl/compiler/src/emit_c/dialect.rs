@@ -19,6 +19,14 @@ impl Precision {
         }
     }
 
+    /// Returns the words for it.
+    pub(super) const fn described(self) -> &'static str {
+        match self {
+            Self::Double => "double precision",
+            Self::Single => "single precision",
+        }
+    }
+
     /// Returns the type in C.
     pub(super) const fn real(self) -> &'static str {
         match self {
@@ -51,8 +59,8 @@ pub(super) enum Numbers {
     Plain,
     /// Numbers with an extended exponent.
     Wide,
-    /// Vectors of this many lanes.
-    Lanes(usize),
+    /// Vectors, one element a lane.
+    Lanes,
 }
 
 /// How code is written.
@@ -75,7 +83,7 @@ impl Dialect {
         match self.numbers {
             Numbers::Plain => format!("energy_{precision}_"),
             Numbers::Wide => format!("energy_{precision}_wide_"),
-            Numbers::Lanes(_) => format!("energy_{precision}_lanes_"),
+            Numbers::Lanes => format!("energy_{precision}_lanes_"),
         }
     }
 
@@ -84,8 +92,8 @@ impl Dialect {
         match (self.numbers, is_mask) {
             (Numbers::Plain, false) => self.precision.real().to_owned(),
             (Numbers::Wide, false) => format!("energy_{}_wide", self.precision.name()),
-            (Numbers::Lanes(_), false) => format!("energy_{}_lanes", self.precision.name()),
-            (Numbers::Lanes(_), true) => format!("energy_{}_lane_mask", self.precision.name()),
+            (Numbers::Lanes, false) => format!("energy_{}_lanes", self.precision.name()),
+            (Numbers::Lanes, true) => format!("energy_{}_lane_mask", self.precision.name()),
             (_, true) => "int".to_owned(),
         }
     }
@@ -96,7 +104,7 @@ impl Dialect {
         let of_masks = match name {
             "both" => Some("&"),
             "either" => Some("|"),
-            "not" if matches!(self.numbers, Numbers::Lanes(_)) => Some("~"),
+            "not" if matches!(self.numbers, Numbers::Lanes) => Some("~"),
             "not" => Some("!"),
             _ => None,
         };
@@ -125,13 +133,13 @@ impl Dialect {
         match self.numbers {
             Numbers::Plain => plain,
             Numbers::Wide => self.call("of", &[&plain]),
-            Numbers::Lanes(_) => self.call("splat", &[&plain]),
+            Numbers::Lanes => self.call("splat", &[&plain]),
         }
     }
 
     pub(super) fn truth(self, value: bool) -> String {
         match self.numbers {
-            Numbers::Lanes(_) => self.call("truth", &[if value { "1" } else { "0" }]),
+            Numbers::Lanes => self.call("truth", &[if value { "1" } else { "0" }]),
             _ => u8::from(value).to_string(),
         }
     }

@@ -6,7 +6,7 @@ use super::dialect::{Dialect, Numbers};
 use super::expression::{Meanings, statement};
 use crate::graph::{Input, NodeId, Op};
 use crate::interpreted::{InputKind, InputNumbers};
-use crate::plan::{Code, GeneralPlan, Plan, RoutinePlan, groups};
+use crate::plan::{Code, Plan, RoutinePlan, groups};
 use energy_runtime::{Kind, RoutineKind};
 
 /// An element that is being written.
@@ -39,16 +39,35 @@ pub(super) struct Function {
 impl Element<'_> {
     /// Writes all routines.
     pub(super) fn routines(&self) -> String {
-        let mut text = self.routine(&self.plan.rest, false);
-        for routine in &self.plan.routines {
+        self.moving(&self.routine(&self.plan.rest, false)) + &self.vertex()
+    }
+
+    /// Writes all routines of the moving part, after some text.
+    fn moving(&self, before: &str) -> String {
+        let mut text = before.to_owned();
+        let is_scalar = self.dialect.numbers == Numbers::Plain;
+        let is_needed = |kind: RoutineKind| is_scalar || !matches!(kind, RoutineKind::Vertex(_));
+        for routine in self.plan.routines.iter().filter(|routine| is_needed(routine.kind)) {
             text.push_str(&self.routine(routine, self.plan.repetition.is_some()));
             if self.plan.repetition.is_some() {
                 text.push_str(&self.sum(routine));
             }
         }
-        text.push_str(&self.expansion());
-        text.push_str(&self.vertex());
-        text
+        text + &self.expansion()
+    }
+
+    /// Writes the routines over vectors of elements, and the loop over elements.
+    pub(super) fn lanes(&self) -> String {
+        let lanes = Element { dialect: self.dialect.of(Numbers::Lanes), ..*self };
+        lanes.moving("") + &lanes.run() + &self.loops(true)
+    }
+
+    /// Returns the name of a function.
+    fn named(&self, function: &str) -> String {
+        match self.dialect.numbers {
+            Numbers::Lanes => format!("{}_lanes_{function}", self.name),
+            _ => format!("{}_{function}", self.name),
+        }
     }
 
     /// Writes the function that chooses among the routines of single vertices; nothing without these.
@@ -131,20 +150,23 @@ impl Element<'_> {
         let function = self.function(routine.kind, &routine.sizes());
         let name = if is_term { format!("term_{}", function.name) } else { function.name.clone() };
         let mut text = String::new();
-        if let Some(general) = &routine.general {
-            self.general(&function, &name, general, is_term, &mut text);
+        let is_scalar = self.dialect.numbers == Numbers::Plain;
+        if let Some(general) = routine.general.as_ref().filter(|_| is_scalar) {
+            text.push_str(&self.general(&function, &name, general, is_term));
         }
         if !is_term {
             text.push_str(&self.comment(&function));
         }
-        let _ = writeln!(text, "ENERGY_ROUTINE unsigned {}_{name}({}) {{", self.name, self.signature(&function, is_term));
+        let returned = if is_scalar { "unsigned" } else { "uint32_t" };
+        let name_here = self.named(&name);
+        let _ = writeln!(text, "ENERGY_ROUTINE {returned} {name_here}({}) {{", self.signature(&function, is_term));
         let guarded =
             routine.general.as_ref().map(|general| routine.ordinary.with_guard(&general.guard, !routine.is_broken));
         let code = guarded.as_ref().unwrap_or(&routine.ordinary);
-        let written = self.statements(self.dialect.of(Numbers::Plain), code, is_term, &mut text);
+        let written = self.written(self.dialect, code, &|input| self.read(input, is_term), "    ", &mut text);
         let used = code.inputs();
-        self.unused(&function, is_term, &used, routine.general.is_some(), &mut text);
-        if let Some(guard) = code.guard {
+        self.unused(&function, is_term, &used, is_scalar && routine.general.is_some(), &mut text);
+        if let (Some(guard), true) = (code.guard, is_scalar) {
             let list = self.arguments(&function, is_term);
             let _ = writeln!(text, "    if (!{}) {{", written.name(guard));
             let _ = writeln!(text, "        return {}_{name}_in_general({list});\n    }}", self.name);
@@ -154,7 +176,16 @@ impl Element<'_> {
                 let _ = writeln!(text, "    {}[{place}] = {};", result.name, written.name(number));
             }
         }
-        if routine.kind == RoutineKind::Rest {
+        if !is_scalar {
+            let [degenerate, kink] = code.flags.map(|mask| mask.map(|mask| written.name(mask)));
+            let guard = code.guard.map(|guard| format!("~{}", written.name(guard)));
+            let masks: Vec<String> = [degenerate, kink, guard].into_iter().flatten().collect();
+            let rare = match masks.is_empty() {
+                true => "0U".to_owned(),
+                false => self.dialect.call("marked", &[&masks.join(" | ")]),
+            };
+            let _ = writeln!(text, "    return {rare};\n}}\n");
+        } else if routine.kind == RoutineKind::Rest {
             let sound = self.dialect.call("are_finite", &["stored", &function.results[0].size.to_string()]);
             let degenerate = code.flags[0].map_or_else(|| "0".to_owned(), |mask| written.name(mask));
             let result = match function.results[0].size {
@@ -168,80 +199,16 @@ impl Element<'_> {
         text
     }
 
-    /// Writes a general path.
-    fn general(&self, function: &Function, name: &str, general: &GeneralPlan, is_term: bool, text: &mut String) {
-        let wide = self.dialect.of(Numbers::Wide);
-        let (inputs, _) = general.inputs();
-        let (reads, sizes) = (inputs.len(), general.path.groups.iter().map(Vec::len).collect::<Vec<_>>());
-        let results: usize = sizes.iter().sum();
-        let number = wide.of_type(false);
-        let _ = writeln!(text, "/* The general path of {name}. */");
-        let _ = writeln!(text, "ENERGY_RARE unsigned {}_{name}_in_general({}) {{", self.name, self.signature(function, is_term));
-        let list: Vec<String> = sizes.iter().map(ToString::to_string).collect();
-        let _ = writeln!(text, "    static const int32_t sizes[{}] = {{{}}};", sizes.len(), list.join(", "));
-        let _ = writeln!(text, "    {number} inputs[{}], results[{results}];", reads.max(1));
-        let _ = writeln!(text, "    {} numbers[{results}];\n    unsigned masks = 0U;", self.dialect.precision.real());
-        for (place, &input) in inputs.iter().enumerate() {
-            let _ = writeln!(text, "    inputs[{place}] = {};", wide.call("of", &[&self.read(input, is_term)]));
-        }
-        self.unused(function, is_term, &inputs, false, text);
-        if inputs.is_empty() {
-            let _ = writeln!(text, "    inputs[0] = {};", wide.constant(0.0));
-        }
-        text.push_str("    {\n");
-        let read = |input: Input| {
-            let place = inputs.iter().position(|&other| other == input).expect("compiler bug: an input of the path");
-            format!("inputs[{place}]")
-        };
-        let written = self.written(wide, &general.path, &read, "        ", text);
-        for (place, &result) in general.path.groups.iter().flatten().enumerate() {
-            let _ = writeln!(text, "        results[{place}] = {};", written.name(result));
-        }
-        let [degenerate, kink] = general.path.flags;
-        let [outside, definite] = general.path.settled;
-        for (mask, bit) in [(outside, 1), (definite, 2), (degenerate, 4), (kink, 4)] {
-            if let Some(mask) = mask {
-                let _ = writeln!(text, "        masks |= {} ? {bit}U : 0U;", written.name(mask));
-            }
-        }
-        text.push_str("    }\n");
-        let roles = u8::from(function.kind.has_values()) + 2 * u8::from(function.kind.is_energy());
-        let settled = self.dialect.call(
-            "settled",
-            &[
-                "inputs",
-                &reads.to_string(),
-                "results",
-                "sizes",
-                &sizes.len().to_string(),
-                &general.summed.to_string(),
-                &format!("{roles}U"),
-                "masks",
-                "numbers",
-            ],
-        );
-        let _ = writeln!(text, "    masks = {settled};");
-        let mut first = 0;
-        for (result, size) in function.results.iter().zip(&sizes) {
-            if *size > 0 {
-                let _ = writeln!(
-                    text,
-                    "    memcpy({}, numbers + {first}, {size} * sizeof *numbers);",
-                    result.name,
-                );
-            }
-            first += size;
-        }
-        text.push_str("    return masks;\n}\n\n");
-    }
-
     /// Writes the sum of a routine over all terms.
     fn sum(&self, routine: &RoutinePlan) -> String {
         let repetition = self.plan.repetition.as_ref().expect("compiler bug: a sum has terms");
         let function = self.function(routine.kind, &routine.sizes());
         let (real, terms) = (self.dialect.precision.real(), repetition.terms());
-        let mut text = self.comment(&function);
-        let _ = writeln!(text, "ENERGY_ROUTINE unsigned {}_{}({}) {{", self.name, function.name, self.signature(&function, false));
+        let (number, is_scalar) = (self.dialect.of_type(false), self.dialect.numbers == Numbers::Plain);
+        let mut text = if is_scalar { self.comment(&function) } else { String::new() };
+        let returned = if is_scalar { "unsigned" } else { "uint32_t" };
+        let name_here = self.named(&function.name);
+        let _ = writeln!(text, "ENERGY_ROUTINE {returned} {name_here}({}) {{", self.signature(&function, false));
         let constants = repetition.table[0].len();
         let rows: Vec<String> = repetition
             .table
@@ -258,10 +225,10 @@ impl Element<'_> {
             let _ = writeln!(text, "    static const {real} table[{terms}][1];");
         }
         for result in &function.results {
-            let _ = writeln!(text, "    {real} term_{}[{}];", result.name, result.size);
+            let _ = writeln!(text, "    {number} term_{}[{}];", result.name, result.size);
         }
-        let _ = writeln!(text, "    {real} all = {};", self.dialect.constant(0.0));
-        let _ = writeln!(text, "    unsigned flags = 0U;\n    int32_t term, i;");
+        let _ = writeln!(text, "    {number} all = {};", self.dialect.constant(0.0));
+        let _ = writeln!(text, "    {returned} flags = 0U;\n    int32_t term, i;");
         for result in &function.results {
             let _ = writeln!(text, "    for (i = 0; i < {}; i++) {{\n        {}[i] = {};\n    }}", result.size, result.name, self.dialect.constant(0.0));
         }
@@ -271,9 +238,8 @@ impl Element<'_> {
         let terms: Vec<String> = function.results.iter().map(|result| format!("term_{}", result.name)).collect();
         let _ = writeln!(
             text,
-            "        flags |= {}_term_{}({}, {own}, table[term], {});",
-            self.name,
-            function.name,
+            "        flags |= {}({}, {own}, table[term], {});",
+            self.named(&format!("term_{}", function.name)),
             inputs.join(", "),
             terms.join(", ")
         );
@@ -290,7 +256,12 @@ impl Element<'_> {
             let name = result.name;
             let _ = writeln!(text, "    for (i = 0; i < {}; i++) {{\n        all += {name}[i];\n    }}", result.size);
         }
-        let _ = writeln!(text, "    return flags | (all - all == {} ? 0U : ENERGY_DEGENERATE);\n}}\n", self.dialect.constant(0.0));
+        let zero = self.dialect.constant(0.0);
+        let overflow = match is_scalar {
+            true => format!("(all - all == {zero} ? 0U : ENERGY_DEGENERATE)"),
+            false => self.dialect.call("marked", &[&format!("~(all - all == {zero})")]),
+        };
+        let _ = writeln!(text, "    return flags | {overflow};\n}}\n");
         text
     }
 
@@ -299,40 +270,153 @@ impl Element<'_> {
         let (Some(expansion), Some(reduced)) = (&self.plan.expansion, self.plan.find(RoutineKind::ReducedHessian)) else {
             return String::new();
         };
-        let real = self.dialect.precision.real();
+        let (real, is_scalar) = (self.dialect.of_type(false), self.dialect.numbers == Numbers::Plain);
+        let returned = if is_scalar { "unsigned" } else { "uint32_t" };
         let sizes = reduced.sizes();
         let (first, second) = (sizes[1], sizes[2]);
         let hessian = self.functions().pop().expect("compiler bug: the Hessian comes last");
         let mut text = format!(
             "/* Expands derivatives by reduced coordinates to points: signed sums. */\nENERGY_ROUTINE void \
-             {}_expand(const {real} *ENERGY_RESTRICT reduced_gradient, const {real} *ENERGY_RESTRICT reduced_hessian, \
+             {}(const {real} *ENERGY_RESTRICT reduced_gradient, const {real} *ENERGY_RESTRICT reduced_hessian, \
              {real} *ENERGY_RESTRICT gradient, {real} *ENERGY_RESTRICT hessian) {{\n",
-            self.name
+            self.named("expand")
         );
         let read = |input: Input| match input {
             Input::Precomputed(number) if usize::from(number) < first => format!("reduced_gradient[{number}]"),
             Input::Precomputed(number) => format!("reduced_hessian[{}]", usize::from(number) - first),
             _ => unreachable!("compiler bug: an expansion reads derivatives"),
         };
-        let written = self.written(self.dialect.of(Numbers::Plain), expansion, &read, "    ", &mut text);
+        let written = self.written(self.dialect, expansion, &read, "    ", &mut text);
+        for name in ["reduced_gradient", "reduced_hessian"] {
+            if !expansion.inputs().iter().any(|&input| read(input).starts_with(&format!("{name}["))) {
+                let _ = writeln!(text, "    (void){name};");
+            }
+        }
         for (result, group) in ["gradient", "hessian"].iter().zip(&expansion.groups) {
             for (place, &number) in group.iter().enumerate() {
                 let _ = writeln!(text, "    {result}[{place}] = {};", written.name(number));
             }
         }
         text.push_str("}\n\n");
-        text.push_str(&self.comment(&hessian));
-        let _ = writeln!(text, "ENERGY_ROUTINE unsigned {}_hessian({}) {{", self.name, self.signature(&hessian, false));
+        text.push_str(&if is_scalar { self.comment(&hessian) } else { String::new() });
+        let name_here = self.named("hessian");
+        let _ = writeln!(text, "ENERGY_ROUTINE {returned} {name_here}({}) {{", self.signature(&hessian, false));
         let _ = writeln!(text, "    {real} reduced_gradient[{first}], reduced_hessian[{second}];");
         let inputs: Vec<&str> = hessian.arguments.iter().map(|argument| argument.name).collect();
         let _ = writeln!(
             text,
-            "    const unsigned flags = {}_reduced_hessian({}, value, reduced_gradient, reduced_hessian);",
-            self.name,
+            "    const {returned} flags = {}({}, value, reduced_gradient, reduced_hessian);",
+            self.named("reduced_hessian"),
             inputs.join(", ")
         );
-        let _ = writeln!(text, "    {}_expand(reduced_gradient, reduced_hessian, gradient, hessian);", self.name);
+        let _ = writeln!(text, "    {}(reduced_gradient, reduced_hessian, gradient, hessian);", self.named("expand"));
         text.push_str("    return flags;\n}\n\n");
+        text
+    }
+
+    /// Writes the function that runs a routine by number over vectors.
+    fn run(&self) -> String {
+        let number = self.dialect.of_type(false);
+        let mut text = format!(
+            "static uint32_t {}(int32_t routine, const {number} *const *arguments, {number} *const *results) {{\n    \
+             switch (routine) {{\n",
+            self.named("run")
+        );
+        let is_run = |function: &Function| !matches!(function.kind, RoutineKind::Vertex(_) | RoutineKind::Rest);
+        for function in self.functions().into_iter().filter(is_run) {
+            let _ = writeln!(text, "{}", self.case(&function));
+        }
+        text.push_str("    default:\n        return UINT32_MAX;\n    }\n}\n\n");
+        text
+    }
+
+    /// Writes the case of a routine in a function that runs it by number.
+    fn case(&self, function: &Function) -> String {
+        let arguments = (0..function.arguments.len()).map(|number| format!("arguments[{number}]"));
+        let results = (0..function.results.len()).map(|number| format!("results[{number}]"));
+        let list = arguments.chain(results).collect::<Vec<_>>().join(", ");
+        let constant = function.name.to_uppercase();
+        format!("    case ENERGY_{constant}:\n        return {}({list});", self.named(&function.name))
+    }
+
+    /// Writes the loop over elements: one at a time, or vectors of them.
+    pub(super) fn loops(&self, in_lanes: bool) -> String {
+        let (name, precision, real) = (self.name, self.dialect.precision.name(), self.dialect.precision.real());
+        let results = |function: &Function| function.results.iter().map(|result| result.size).sum::<usize>();
+        let results = self.functions().iter().map(results).max().unwrap_or_default();
+        let Plan { coordinates, parameters, shape, .. } = self.plan;
+        let room = coordinates.max(shape) + coordinates + parameters + self.plan.stored() + results;
+        match in_lanes {
+            false => format!(
+                "\nvoid {name}_evaluate(int32_t routine, energy_{precision}_batch *batch) {{\n    {real} \
+                 work[{room}];\n    batch->flagged = 0U;\n    batch->unsettled_count = 0U;\n    \
+                 energy_{precision}_run_each(&{name}, routine, batch, 0U, batch->count, work);\n}}\n"
+            ),
+            true => format!(
+                "void {name}_evaluate_lanes(int32_t routine, energy_{precision}_batch *batch) {{\n    \
+                 energy_{precision}_lanes work[{room}];\n    {real} single[{room}];\n    batch->flagged = 0U;\n    \
+                 batch->unsettled_count = 0U;\n    energy_{precision}_run_lanes(&{name}, {name}_lanes_run, routine, \
+                 batch, work, single);\n}}\n"
+            ),
+        }
+    }
+
+    /// Writes a kernel of CUDA for each routine, one element a thread, and a function that launches them.
+    pub(super) fn kernels(&self) -> String {
+        let (name, real) = (self.name, self.dialect.precision.real());
+        let batch = format!("energy_{}_batch", self.dialect.precision.name());
+        let function = |function: &str, arguments: &str| {
+            format!("energy_{}_{function}({arguments});", self.dialect.precision.name())
+        };
+        let (mut text, mut cases) = (String::new(), String::new());
+        for Function { kind, name: routine, arguments, results } in self.functions() {
+            if matches!(kind, RoutineKind::Vertex(_)) {
+                continue;
+            }
+            let _ = writeln!(text, "__global__ void {name}_{routine}_kernel({batch} batch) {{");
+            let _ = writeln!(text, "    const size_t i = (size_t)blockIdx.x * blockDim.x + threadIdx.x;");
+            for array in arguments.iter().chain(&results) {
+                let _ = writeln!(text, "    {real} {}[{}];", array.name, array.size.max(1));
+            }
+            text.push_str("    unsigned flags;\n    if (i >= batch.count) {\n        return;\n    }\n");
+            for Argument { name, size, .. } in &arguments {
+                let (how, from) = match *name {
+                    "x" | "u" => ("read_points", "&batch, &batch.x"),
+                    "v" => ("read_points", "&batch, &batch.v"),
+                    "rest" => ("read", "&batch.x"),
+                    "parameters" => ("read", "&batch.parameters"),
+                    _ => ("read", "&batch.stored"),
+                };
+                let _ = writeln!(text, "    {}", function(how, &format!("{from}, i, {size}, {name}")));
+            }
+            let list: Vec<&str> = arguments.iter().chain(&results).map(|array| array.name).collect();
+            let _ = writeln!(text, "    flags = {name}_{routine}({});", list.join(", "));
+            for (place, Argument { name, size, .. }) in results.iter().enumerate() {
+                let slots = format!(
+                    "energy_{}_slot_size(ENERGY_{}, {place}, {size})",
+                    self.dialect.precision.name(),
+                    routine.to_uppercase()
+                );
+                let coordinates = self.plan.coordinates;
+                let write = format!("&batch.results[{place}], i, {size}, {slots}, {coordinates}, {name}");
+                let _ = writeln!(text, "    {}", function("write", &write));
+            }
+            let _ = writeln!(text, "    {}\n}}\n", function("device_note", "&batch, i, flags"));
+            let constant = routine.to_uppercase();
+            let _ = writeln!(
+                cases,
+                "    case ENERGY_{constant}:\n        {name}_{routine}_kernel<<<blocks, threads, 0, stream>>>(*batch);\n        \
+                 break;"
+            );
+        }
+        let _ = write!(
+            text,
+            "/* Runs a routine on many elements on a GPU. All arrays of the batch are in its memory. */\nextern \"C\" \
+             cudaError_t {name}_launch(int32_t routine, const {batch} *batch, cudaStream_t stream) {{\n    const unsigned \
+             threads = 128U;\n    const unsigned blocks = (unsigned)((batch->count + threads - 1U) / threads);\n    if \
+             (blocks == 0U) {{\n        return cudaSuccess;\n    }}\n    switch (routine) {{\n{cases}    default:\n        \
+             return cudaErrorInvalidValue;\n    }}\n    return cudaGetLastError();\n}}\n"
+        );
         text
     }
 
@@ -347,11 +431,7 @@ impl Element<'_> {
         let (vertices, functions): (Vec<_>, Vec<_>) =
             functions.into_iter().partition(|function| matches!(function.kind, RoutineKind::Vertex(_)));
         for function in &functions {
-            let arguments = (0..function.arguments.len()).map(|number| format!("arguments[{number}]"));
-            let results = (0..function.results.len()).map(|number| format!("results[{number}]"));
-            let list = arguments.chain(results).collect::<Vec<_>>().join(", ");
-            let constant = function.name.to_uppercase();
-            let _ = writeln!(text, "    case ENERGY_{constant}:\n        return {name}_{}({list});", function.name);
+            let _ = writeln!(text, "{}", self.case(function));
         }
         text.push_str("    default:\n        return ENERGY_DEGENERATE;\n    }\n}\n\n");
         let of_vertex = if vertices.is_empty() { "NULL".to_owned() } else { format!("{name}_vertex") };
@@ -383,10 +463,11 @@ impl Element<'_> {
         text + "   Returns flags. */\n"
     }
 
-    fn signature(&self, function: &Function, is_term: bool) -> String {
-        let real = self.dialect.precision.real();
+    pub(super) fn signature(&self, function: &Function, is_term: bool) -> String {
+        let real = self.dialect.of_type(false);
         let inputs = function.arguments.iter().map(|argument| format!("const {real} *{}", argument.name));
-        let own = ["own", "constants"].into_iter().filter(|_| is_term).map(|name| format!("const {real} *{name}"));
+        let own = [("own", &*real), ("constants", self.dialect.precision.real())];
+        let own = own.into_iter().filter(|_| is_term).map(|(name, of)| format!("const {of} *{name}"));
         let results = function.results.iter().map(|result| format!("{real} *ENERGY_RESTRICT {}", result.name));
         inputs.chain(own).chain(results).collect::<Vec<_>>().join(", ")
     }
@@ -398,23 +479,19 @@ impl Element<'_> {
     }
 
     /// Says that arguments are not used on purpose.
-    fn unused(&self, function: &Function, is_term: bool, used: &[Input], passes_on: bool, text: &mut String) {
+    pub(super) fn unused(&self, function: &Function, is_term: bool, used: &[Input], passes_on: bool, text: &mut String) {
         if passes_on {
             return;
         }
         let own = ["own", "constants"].into_iter().filter(|_| is_term);
         for name in function.arguments.iter().map(|argument| argument.name).chain(own) {
-            if !used.iter().any(|&input| self.read(input, is_term).starts_with(&format!("{name}["))) {
+            if !used.iter().any(|&input| self.read(input, is_term).contains(&format!("{name}["))) {
                 let _ = writeln!(text, "    (void){name};");
             }
         }
         for result in function.results.iter().filter(|result| result.size == 0) {
             let _ = writeln!(text, "    (void){};", result.name);
         }
-    }
-
-    fn statements(&self, dialect: Dialect, code: &Code, is_term: bool, text: &mut String) -> Written {
-        self.written(dialect, code, &|input| self.read(input, is_term), "    ", text)
     }
 
     /// Writes the statements of some code.
@@ -447,7 +524,7 @@ impl Element<'_> {
     }
 
     /// Returns the expression that reads an input.
-    fn read(&self, input: Input, is_term: bool) -> String {
+    pub(super) fn read(&self, input: Input, is_term: bool) -> String {
         match input {
             Input::Position(i) if self.plan.declaration.kind == Kind::Residual => format!("u[{i}]"),
             Input::Position(i) => format!("x[{i}]"),
@@ -456,7 +533,11 @@ impl Element<'_> {
             Input::Rest(i) => format!("rest[{i}]"),
             Input::Precomputed(i) => match (&self.plan.repetition, usize::from(i)) {
                 (Some(of), i) if is_term && i >= of.shared + of.stride => {
-                    format!("constants[{}]", i - of.shared - of.stride)
+                    let constant = format!("constants[{}]", i - of.shared - of.stride);
+                    match self.dialect.numbers {
+                        Numbers::Lanes => self.dialect.call("splat", &[&constant]),
+                        _ => constant,
+                    }
                 }
                 (Some(of), i) if is_term && i >= of.shared => format!("own[{}]", i - of.shared),
                 (_, i) => format!("stored[{i}]"),

@@ -26,15 +26,19 @@ impl Meanings {
     pub(super) fn of(&self, op: Op) -> Rc<Expression> {
         let spelling = op.spelling().expect("compiler bug: inputs are read, rules resolved and caution decided elsewhere");
         let mut known = self.0.borrow_mut();
-        let parsed = known.entry(spelling.meaning).or_insert_with(|| {
-            let meaning = syn::parse_str(spelling.meaning).expect("the table of operations is Rust");
-            Rc::new(Expression::parsed(&meaning, spelling.operands))
-        });
+        let parsed = known
+            .entry(spelling.meaning)
+            .or_insert_with(|| Rc::new(Expression::of_text(spelling.meaning, spelling.operands)));
         Rc::clone(parsed)
     }
 }
 
 impl Expression {
+    /// Reads the meaning of an operation.
+    pub(super) fn of_text(meaning: &str, operands: &[&str]) -> Self {
+        Self::parsed(&syn::parse_str(meaning).expect("the table of operations is Rust"), operands)
+    }
+
     fn parsed(meaning: &Expr, operands: &[&str]) -> Self {
         let call = |name: &str, list: Vec<&Expr>| {
             Self::Call(name.to_owned(), list.into_iter().map(|inner| Self::parsed(inner, operands)).collect())

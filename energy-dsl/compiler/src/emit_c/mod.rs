@@ -6,7 +6,9 @@
 mod dialect;
 mod element;
 mod expression;
+mod folder;
 mod numbers;
+mod tape;
 
 use std::fmt::Write as _;
 
@@ -16,12 +18,15 @@ use element::Element;
 use expression::Meanings;
 
 pub use dialect::Precision;
+pub use folder::{Origin, origin};
 
 /// A language that plans are rendered as.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Target {
     /// C99, which is also C++17.
     C,
+    /// The same as C, in files that end in `.cpp`.
+    Cpp,
     /// CUDA C++, which also runs on the host.
     Cuda,
 }
@@ -35,26 +40,107 @@ pub struct SourceFile {
     pub text: String,
 }
 
-/// Renders elements.
-#[must_use]
-pub fn sources(elements: &[Interpreted], target: Target, precision: Precision) -> Vec<SourceFile> {
-    let mut files = vec![SourceFile { name: format!("energy_{}.h", precision.name()), text: numbers::header(precision) }];
-    let dialect = Dialect { precision, numbers: Numbers::Plain, operators: target == Target::C };
+/// Renders elements as a folder that needs nothing else: headers, loops over elements, a `README.md` and a
+/// `CMakeLists.txt`. Equal elements give equal bytes.
+///
+/// # Errors
+/// When two elements have one name in C.
+pub fn sources(
+    elements: &[Interpreted],
+    target: Target,
+    precisions: &[Precision],
+) -> Result<Vec<SourceFile>, SourceError> {
+    let names: Vec<String> = elements.iter().map(|element| snake_case(&element.declaration().name)).collect();
+    if let Some(place) = (1..names.len()).find(|&place| names[..place].contains(&names[place])) {
+        return Err(SourceError { name: names[place].clone() });
+    }
+    let mut files: Vec<SourceFile> = precisions.iter().flat_map(|&of| of_precision(elements, &names, target, of)).collect();
+    files.extend(project(&files, target, precisions));
+    Ok(files)
+}
+
+/// Two elements that have one name in C.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct SourceError {
+    /// The name.
+    pub name: String,
+}
+
+impl std::fmt::Display for SourceError {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "two declarations are called `{}` in C; rename one of them", self.name)
+    }
+}
+
+impl std::error::Error for SourceError {}
+
+fn of_precision(
+    elements: &[Interpreted],
+    names: &[String],
+    target: Target,
+    precision: Precision,
+) -> Vec<SourceFile> {
+    let suffix = precision.name();
+    let shared = |part: &str, about: &str, text: String| {
+        folder::stamped(&format!("energy_{suffix}{part}.h"), &[about.to_owned()], &text)
+    };
+    let mut files = vec![
+        shared("", "Numbers, rounding errors, elementary functions.", numbers::header(precision)),
+        shared("_loops", "Loops over elements.", numbers::loops(precision)),
+        shared("_lanes", "Vectors of numbers, and loops over vectors of elements.", numbers::lanes(precision)),
+    ];
+    let dialect = Dialect { precision, numbers: Numbers::Plain, operators: target != Target::Cuda };
     let meanings = Meanings::default();
-    for element in elements {
-        let name = format!("{}_{}", snake_case(&element.declaration().name), precision.name());
+    let source = if target == Target::Cpp { "cpp" } else { "c" };
+    for (element, name) in elements.iter().zip(names) {
+        let name = format!("{name}_{suffix}");
+        let declaration = element.declaration();
+        let about = [format!("{} {}: {}", declaration.kind.keyword(), declaration.name, declaration.formula)];
         let written =
             Element { plan: element.plan(), inputs: element.inputs(), name: &name, dialect, meanings: &meanings };
-        let guard = format!("{}_H", name.to_uppercase());
-        let mut text = format!("#ifndef {guard}\n#define {guard}\n\n#include \"energy_{}.h\"\n\n", precision.name());
-        text.push_str(&written.routines());
-        let _ = writeln!(text, "/* The element, for hosts that do not know it. */");
-        let _ = writeln!(text, "extern const energy_{}_element {name};\n\n#endif", precision.name());
-        files.push(SourceFile { name: format!("{name}.h"), text });
-        let text = format!("#include \"{name}.h\"\n\n{}", written.description());
-        files.push(SourceFile { name: format!("{name}.c"), text });
+        let mut add = |ending: &str, text: String| files.push(folder::stamped(&format!("{name}{ending}"), &about, &text));
+        add(".h", header(&written));
+        let text = format!("#include \"{name}.h\"\n\n{}{}", written.description(), written.loops(false));
+        add(&format!(".{source}"), text);
+        let operators = Element { dialect: Dialect { operators: true, ..dialect }, ..written };
+        let text = format!("#include \"{name}.h\"\n#include \"energy_{suffix}_lanes.h\"\n\n{}", operators.lanes());
+        add(&format!("_lanes.{source}"), text);
+        if target == Target::Cuda {
+            add(".cu", format!("#include \"{name}.h\"\n\n{}", operators.kernels()));
+        }
     }
     files
+}
+
+/// Returns the files that describe a folder and build it.
+fn project(files: &[SourceFile], target: Target, precisions: &[Precision]) -> [SourceFile; 2] {
+    let is_source = |name: &str| [".c", ".cpp", ".cu"].iter().any(|ending| name.ends_with(ending));
+    let sources: Vec<String> =
+        files.iter().filter(|file| is_source(&file.name)).map(|file| format!("  {}", file.name)).collect();
+    let language = match target {
+        Target::C => "C",
+        Target::Cpp => "CXX",
+        Target::Cuda => "C CUDA",
+    };
+    let cmake =
+        include_str!("CMakeLists.txt.in").replace("@LANGUAGE@", language).replace("@FILES@", &sources.join("\n"));
+    let described: Vec<&str> = precisions.iter().map(|precision| precision.described()).collect();
+    let readme = include_str!("README.md.in").replace("@PRECISIONS@", &described.join(" and "));
+    [folder::stamped("CMakeLists.txt", &[], &cmake), folder::stamped("README.md", &[], &readme)]
+}
+
+/// Returns the header of an element.
+fn header(element: &Element<'_>) -> String {
+    let (name, suffix) = (element.name, element.dialect.precision.name());
+    let guard = format!("{}_H", name.to_uppercase());
+    format!(
+        "#ifndef {guard}\n#define {guard}\n\n#include \"energy_{suffix}_loops.h\"\n\n#ifdef __cplusplus\nextern \"C\" \
+         {{\n#endif\n\n{}/* The element, for hosts that do not know it. */\nextern const energy_{suffix}_element \
+         {name};\n\n/* Runs a routine on many elements: one at a time, and vectors of them with the same results. \
+         */\nvoid {name}_evaluate(int32_t routine, energy_{suffix}_batch *batch);\nvoid {name}_evaluate_lanes(int32_t \
+         routine, energy_{suffix}_batch *batch);\n\n#ifdef __cplusplus\n}}\n#endif\n\n#endif\n",
+        element.routines()
+    )
 }
 
 /// Returns a name in the spelling of C: `HookeSpring` becomes `hooke_spring`.

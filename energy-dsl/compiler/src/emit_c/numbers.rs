@@ -6,31 +6,45 @@ use super::dialect::{Dialect, Numbers, Precision};
 use super::expression::Expression;
 use energy_runtime::{MASKS, RoutineKind, Trace, TraceStep, elementary_functions};
 
-/// Returns the text of the header.
+/// Returns the text of the header of scalars.
 pub(super) fn header(precision: Precision) -> String {
     let huge = match precision {
         Precision::Double => include_str!("huge_f64.h"),
         Precision::Single => include_str!("huge_f32.h"),
     };
-    let dialect = Dialect { precision, numbers: Numbers::Plain, operators: false };
-    let functions: String =
-        elementary_functions(precision == Precision::Single).iter().map(|trace| function(dialect, trace)).collect();
-    let parts = [
-        include_str!("numbers.h"),
-        "\n",
-        huge,
-        include_str!("huge.h"),
-        "\n/* Elementary functions: within 1 ulp, the same bits on every machine. */\n",
-        &functions,
-        "\n",
-        include_str!("wide.h"),
-    ];
-    let guard = format!("ENERGY_{}_H", precision.name().to_uppercase());
+    let functions = functions(Dialect { precision, numbers: Numbers::Plain, operators: false });
+    let interpreter = super::tape::interpreter(precision);
+    let parts = [include_str!("numbers.h"), "\n", huge, include_str!("huge.h"), &functions, "\n", include_str!("wide.h"), "\n", &interpreter];
+    let includes = "#include <float.h>\n#include <math.h>\n#include <stddef.h>\n#include <stdint.h>\n#include \
+                    <string.h>\n\n";
+    guarded(precision, "", includes, &parts)
+}
+
+/// Returns the text of the header of loops over elements.
+pub(super) fn loops(precision: Precision) -> String {
+    let includes = format!("#include \"energy_{}.h\"\n\n", precision.name());
+    guarded(precision, "_loops", &includes, &[include_str!("loops.h")])
+}
+
+/// Returns the text of the header of vectors.
+pub(super) fn lanes(precision: Precision) -> String {
+    let functions = functions(Dialect { precision, numbers: Numbers::Lanes, operators: true });
+    let includes = format!("#include \"energy_{}_loops.h\"\n\n", precision.name());
+    let parts = [include_str!("lanes.h"), &functions, "\n", include_str!("lane_loops.h")];
+    guarded(precision, "_lanes", &includes, &parts)
+}
+
+fn functions(dialect: Dialect) -> String {
+    let traces = elementary_functions(dialect.precision == Precision::Single);
+    let functions = traces.iter().map(|trace| function(dialect, trace));
+    let comment = "\n/* Elementary functions: within 1 ulp, the same bits on every machine. */\n".to_owned();
+    std::iter::once(comment).chain(functions).collect()
+}
+
+fn guarded(precision: Precision, name: &str, includes: &str, parts: &[&str]) -> String {
+    let guard = format!("ENERGY_{}{}_H", precision.name(), name).to_uppercase();
     let body = parts.iter().map(|part| filled(precision, part)).collect::<String>();
-    format!(
-        "#ifndef {guard}\n#define {guard}\n\n#include <float.h>\n#include <math.h>\n#include <stddef.h>\n#include \
-         <stdint.h>\n#include <string.h>\n\n{body}\n#endif\n"
-    )
+    format!("#ifndef {guard}\n#define {guard}\n\n{includes}{body}\n#endif\n")
 }
 
 /// Returns the numbers of routines, as entries of an enumeration.
@@ -43,7 +57,7 @@ fn routines() -> String {
 fn function(dialect: Dialect, trace: &Trace) -> String {
     let number = dialect.of_type(false);
     let arguments = ["a", "b"][..trace.arguments].iter().map(|name| format!("{number} {name}")).collect::<Vec<_>>();
-    let mut text = format!("\nENERGY_RARE {number} @{}({}) {{\n", trace.name, arguments.join(", "));
+    let mut text = format!("\nENERGY_RARE {number} {}{}({}) {{\n", dialect.prefix(), trace.name, arguments.join(", "));
     let mut names: Vec<String> = Vec::with_capacity(trace.steps.len());
     for (place, step) in trace.steps.iter().enumerate() {
         names.push(match step {
@@ -93,6 +107,8 @@ pub(super) fn filled(precision: Precision, text: &str) -> String {
         ("@LOG2_E", choose("1.4426950408889634", "1.442695f")),
         ("@LN_2_HIGH", choose("0.6931471805599453", "0.6931472f")),
         ("@LN_2_LOW", choose("2.3190468138462996e-17", "-1.9046542e-9f")),
+        ("@WIDEST", choose("8", "16")),
+        ("@ints", choose("int64_t", "int32_t")),
         ("@real", precision.real()),
         ("@bits", choose("uint64_t", "uint32_t")),
     ];

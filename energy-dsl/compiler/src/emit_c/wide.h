@@ -52,7 +52,7 @@ ENERGY_FN @wide @wide_new(@real significand, int32_t exponent) {
     return @wide_split(significand, exponent);
 }
 
-ENERGY_FN @wide @wide_of(@real a) { return @wide_new(a, 0); }
+ENERGY_RARE @wide @wide_of(@real a) { return @wide_new(a, 0); }
 ENERGY_FN int32_t @wide_exponent(@wide a) { return @wide_split(a.significand, a.exponent).exponent; }
 
 /* The nearest plain number: infinite or 0 if it is out of range. */
@@ -94,15 +94,15 @@ ENERGY_RARE int32_t @wide_align(@wide *a, @wide *b) {
     return exponent;
 }
 
-ENERGY_FN @wide @wide_neg(@wide a) { return @wide_plain(-a.significand, a.exponent); }
-ENERGY_FN @wide @wide_abs(@wide a) { return @wide_plain(@abs(a.significand), a.exponent); }
+ENERGY_RARE @wide @wide_neg(@wide a) { return @wide_plain(-a.significand, a.exponent); }
+ENERGY_RARE @wide @wide_abs(@wide a) { return @wide_plain(@abs(a.significand), a.exponent); }
 
 ENERGY_RARE @wide @wide_add(@wide a, @wide b) {
     const int32_t exponent = @wide_align(&a, &b);
     return @wide_new(@add(a.significand, b.significand), exponent);
 }
 
-ENERGY_FN @wide @wide_sub(@wide a, @wide b) { return @wide_add(a, @wide_neg(b)); }
+ENERGY_RARE @wide @wide_sub(@wide a, @wide b) { return @wide_add(a, @wide_neg(b)); }
 
 ENERGY_RARE @wide @wide_mul(@wide a, @wide b) {
     return @wide_new(@mul(a.significand, b.significand), a.exponent + b.exponent);
@@ -128,8 +128,8 @@ ENERGY_RARE @wide @wide_mul_add(@wide a, @wide b, @wide c) {
     return @wide_new(@mul_add(a.significand, b.significand, c.significand), exponent);
 }
 
-ENERGY_FN @wide @wide_fused_mul_sub(@wide a, @wide b, @wide c) { return @wide_mul_add(a, b, @wide_neg(c)); }
-ENERGY_FN @wide @wide_root_error(@wide a, @wide root) { return @wide_mul_add(@wide_neg(root), root, a); }
+ENERGY_RARE @wide @wide_fused_mul_sub(@wide a, @wide b, @wide c) { return @wide_mul_add(a, b, @wide_neg(c)); }
+ENERGY_RARE @wide @wide_root_error(@wide a, @wide root) { return @wide_mul_add(@wide_neg(root), root, a); }
 
 ENERGY_RARE @wide @wide_sqrt(@wide a) {
     if (a.exponent % 2 == 0) {
@@ -138,33 +138,25 @@ ENERGY_RARE @wide @wide_sqrt(@wide a) {
     return @wide_new(@sqrt(@add(a.significand, a.significand)), (a.exponent - 1) / 2);
 }
 
-ENERGY_FN int @wide_less(@wide a, @wide b) {
+ENERGY_RARE int @wide_less(@wide a, @wide b) {
     (void)@wide_align(&a, &b);
     return a.significand < b.significand;
 }
 
-ENERGY_FN int @wide_precedes(@wide a, @wide b) { return @wide_less(a, b); }
+ENERGY_RARE int @wide_precedes(@wide a, @wide b) { return @wide_less(a, b); }
 
-ENERGY_FN int @wide_less_or_equal(@wide a, @wide b) {
+ENERGY_RARE int @wide_less_or_equal(@wide a, @wide b) {
     (void)@wide_align(&a, &b);
     return a.significand <= b.significand;
 }
 
-ENERGY_FN int @wide_equal(@wide a, @wide b) {
+ENERGY_RARE int @wide_equal(@wide a, @wide b) {
     (void)@wide_align(&a, &b);
     return a.significand == b.significand;
 }
 
-ENERGY_FN @wide @wide_min(@wide a, @wide b) { return @wide_less(b, a) ? b : a; }
-ENERGY_FN @wide @wide_max(@wide a, @wide b) { return @wide_less(a, b) ? b : a; }
-ENERGY_FN @wide @wide_select(int mask, @wide yes, @wide no) { return mask ? yes : no; }
-
-/* Extended numbers are never said to be moderate: they get all precautions. */
-ENERGY_FN int @wide_is_moderate(@wide a, int32_t degree) {
-    (void)a;
-    (void)degree;
-    return 0;
-}
+ENERGY_RARE @wide @wide_min(@wide a, @wide b) { return @wide_less(b, a) ? b : a; }
+ENERGY_RARE @wide @wide_max(@wide a, @wide b) { return @wide_less(a, b) ? b : a; }
 
 ENERGY_RARE @wide @wide_sum_error(@wide a, @wide b) {
     const int32_t apart = a.exponent - b.exponent;
@@ -176,7 +168,7 @@ ENERGY_RARE @wide @wide_sum_error(@wide a, @wide b) {
     return @wide_new(@sum_error(a.significand, b.significand), exponent);
 }
 
-ENERGY_FN @wide @wide_difference_error(@wide a, @wide b) { return @wide_sum_error(a, @wide_neg(b)); }
+ENERGY_RARE @wide @wide_difference_error(@wide a, @wide b) { return @wide_sum_error(a, @wide_neg(b)); }
 
 ENERGY_RARE @wide @wide_product_error(@wide a, @wide b) {
     return @wide_new(@product_error(a.significand, b.significand), a.exponent + b.exponent);
@@ -229,7 +221,7 @@ ENERGY_RARE @wide @wide_atan2(@wide y, @wide x) {
     return @wide_new(@atan2(y.significand, x.significand), 0);
 }
 
-ENERGY_FN @wide @wide_moderate_atan2(@wide y, @wide x) { return @wide_atan2(y, x); }
+ENERGY_RARE @wide @wide_moderate_atan2(@wide y, @wide x) { return @wide_atan2(y, x); }
 
 ENERGY_RARE @wide @wide_powf(@wide a, @wide exponent) {
     const @real power = @wide_to_plain(exponent);

@@ -33,6 +33,6 @@ pub(crate) const fn groups(kind: RoutineKind) -> &'static [(&'static str, Shape)
         RoutineKind::ConstraintHessian => &[("value", Numbers), ("jacobian", Vectors), ("hessians", Blocks)],
         RoutineKind::Residual => &[("value", Numbers)],
         RoutineKind::Jacobian => &[("value", Numbers), ("jacobian", Numbers)],
-        RoutineKind::Vertex(_) => &[("value", Number), ("gradient", Numbers), ("block", Numbers)],
+        RoutineKind::Vertex(_) => &[("value", Number), ("gradient", Numbers), ("block", Vectors)],
     }
 }

@@ -81,6 +81,12 @@ pub(super) fn halfwidth(c: char) -> Option<char> {
     }
 }
 
+/// Returns whether a character is a mark on the letter before it, as the tilde of x̃. Few such letters have a code of
+/// their own.
+pub(super) fn is_accent(c: char) -> bool {
+    ('\u{300}'..='\u{36f}').contains(&c) && c != '\u{34f}'
+}
+
 /// Letters that look like Latin ones: each is followed by the Latin letter.
 const LOOK_ALIKES: &str = "\
     аaеeоoрpсcуyхxіiјjѕsкkԁdһhԛqԝwАAВBЕEКKМMНHОOРPСCТTХXУYІIЈJЅS\

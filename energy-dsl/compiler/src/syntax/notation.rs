@@ -41,7 +41,7 @@ struct Lexer<'a> {
     tokens: Vec<Token>,
 }
 
-pub(super) const HAT: char = '\u{302}';
+const HAT: char = '\u{302}';
 
 impl Lexer<'_> {
     fn peek(&self) -> Option<char> {

@@ -83,7 +83,7 @@ impl Lexer<'_> {
         } else if c == '"' {
             self.string();
         } else if is_letter(c) || c == '_' {
-            let name = self.take_while(|c| is_letter(c) || c.is_ascii_digit() || c == '_' || c == notation::HAT);
+            let name = self.take_while(|c| is_letter(c) || c.is_ascii_digit() || c == '_' || characters::is_accent(c));
             self.push(Kind::Name(name.clone()), start, name);
         } else if c.is_ascii_digit() {
             self.number();

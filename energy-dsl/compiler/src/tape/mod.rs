@@ -7,9 +7,9 @@ use crate::graph::Input;
 use crate::plan::{Code, GeneralPlan, Plan, RoutinePlan};
 use energy_runtime::RoutineKind;
 use energy_runtime::tape::{General, Routine, Routines};
-use recorder::{Recorded, record};
+use recorder::Recorded;
 
-pub(crate) use recorder::TooLarge;
+pub(crate) use recorder::{TooLarge, record};
 
 /// Writes all routines of a plan to tapes.
 pub(crate) fn tapes(plan: &Plan) -> Result<Routines, TooLarge> {

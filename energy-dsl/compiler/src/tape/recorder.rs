@@ -11,16 +11,16 @@ use energy_runtime::tape::{Constant, Instruction, Operation, Tape};
 pub(crate) struct TooLarge;
 
 /// A path of a routine as a tape.
-pub(super) struct Recorded {
-    pub(super) tape: Tape,
-    pub(super) groups: Vec<Vec<u16>>,
-    pub(super) flags: [Option<u16>; 2],
-    pub(super) settled: [Option<u16>; 2],
-    pub(super) guard: Option<u16>,
+pub(crate) struct Recorded {
+    pub(crate) tape: Tape,
+    pub(crate) groups: Vec<Vec<u16>>,
+    pub(crate) flags: [Option<u16>; 2],
+    pub(crate) settled: [Option<u16>; 2],
+    pub(crate) guard: Option<u16>,
 }
 
 /// Writes statements to a tape. The inputs have the first slots, in the given order.
-pub(super) fn record(code: &Code, inputs: &[Input]) -> Result<Recorded, TooLarge> {
+pub(crate) fn record(code: &Code, inputs: &[Input]) -> Result<Recorded, TooLarge> {
     let list = code.statements.list();
     let steps = steps(code);
     let mut last_uses = vec![0; list.len()];

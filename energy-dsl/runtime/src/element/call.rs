@@ -4,12 +4,12 @@
 //! retire (failed store forwarding), so the points are read one number at a time, too.
 
 use crate::array::Array;
-use crate::element::{Constraint, ForceLaw, Potential, ReducedPotential, Residual, Vector3};
+use crate::element::{Constraint, ForceLaw, Potential, ReducedPotential, Residual, Vector3, VertexPotential};
 use crate::numbers::Real;
 use crate::numbers::{Kernel, Level, read_alone};
 use crate::results::{
     ConstraintHessian, ConstraintJacobian, ForceJacobians, ForceValue, Gradient, Hessian, HessianVector,
-    ReducedHessian, ResidualJacobian, ResidualValue, Value,
+    ReducedHessian, ResidualJacobian, ResidualValue, Value, Vertex,
 };
 
 /// Declares a kernel that holds an element and the arguments of one routine.
@@ -70,6 +70,19 @@ call!(ConstraintHessianCall: Constraint,
 call!(GaussNewtonCall: Constraint, gauss_newton_at(1 vectors Points<E, T>) -> Hessian<T, Points<E, T>, E::Triangle>);
 call!(ResidualCall: Residual, residual_at(1 numbers E::Unknowns) -> ResidualValue<T, E::Rows>);
 call!(ResidualJacobianCall: Residual, jacobian_at(1 numbers E::Unknowns) -> ResidualJacobian<T, E::Rows, E::Jacobian>);
+
+/// Calls the routine of one vertex.
+#[doc(hidden)]
+pub struct VertexCall<'a, T: Real, E: VertexPotential<T>>(pub &'a E, pub usize, pub &'a E::Points);
+
+impl<T: Real, E: VertexPotential<T>> Kernel for VertexCall<'_, T, E> {
+    type Output = Vertex<T>;
+
+    #[inline(always)]
+    fn run<L: Level>(self) -> Vertex<T> {
+        self.0.vertex_at::<L>(self.1, &vectors(self.2))
+    }
+}
 
 /// Runs another kernel and writes its output to the referenced place.
 pub(super) struct WrittenTo<'a, K: Kernel>(pub K, pub &'a mut K::Output);

@@ -19,7 +19,7 @@ use crate::numbers::Level;
 use crate::numbers::{Number, Real};
 use crate::results::{
     ConstraintHessian, ConstraintJacobian, ForceJacobians, ForceValue, Gradient, Hessian, HessianVector,
-    ReducedHessian, ResidualJacobian, ResidualValue, Value,
+    ReducedHessian, ResidualJacobian, ResidualValue, Value, Vertex,
 };
 use call::WrittenTo;
 #[doc(hidden)]
@@ -214,6 +214,25 @@ pub trait ReducedPotential<T: Real>: Potential<T> {
     fn hessian_free_at<L: Level, const FREE: u32>(&self, x: &Self::Points) -> Hessian<T, Self::Points, Self::Triangle> {
         Self::expand::<FREE>(&self.reduced_hessian_at::<L>(x))
     }
+}
+
+/// A potential with routines for single vertices, as `#[vertex]` asks for. Solvers that move one vertex at a time (vertex
+/// block descent) need no more than these.
+pub trait VertexPotential<T: Real>: Potential<T> {
+    /// Returns U, and its first and second derivatives by one point alone. This costs less than the Hessian.
+    ///
+    /// ```text
+    /// let energy_dsl::Vertex { gradient, block, .. } = spring.vertex(1, &x);
+    /// ```
+    ///
+    /// # Panics
+    /// When the element does not have the point.
+    fn vertex(&self, point: usize, x: &Self::Points) -> Vertex<T>;
+    /// [`Self::vertex`] for callers that run at SIMD level `L`.
+    ///
+    /// # Panics
+    /// When the element does not have the point.
+    fn vertex_at<L: Level>(&self, point: usize, x: &Self::Points) -> Vertex<T>;
 }
 
 /// A force f(x, v), which need not be the gradient of an energy.

@@ -23,7 +23,7 @@ mod tests;
 pub use evaluate::{BlockResults, Expander, Output};
 pub use instruction::{Constant, Instruction, Tape};
 pub use lanes::Slot;
-pub use operation::Operation;
+pub use operation::{Operation, ROWS};
 pub use packed::{Column, TapeElements};
 pub use routine::{General, Input, Repetition, Routine, Routines, TermNumber};
 pub use runner::{Places, stencil_blocks};

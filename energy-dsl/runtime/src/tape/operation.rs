@@ -4,8 +4,8 @@ use crate::with_operations;
 
 macro_rules! define {
     (
-        numbers { $($_section:ident { $($(#[$docs:meta])* $name:ident $_of:tt = $_meaning:expr $(, $_cost:tt)?;)* })* }
-        masks { $($_masks:ident { $($(#[$mask_docs:meta])* $mask:ident $_numbers:tt = $_outcome:expr;)* })* }
+        numbers { $($_section:ident { $($(#[$docs:meta])* $name:ident $of:tt = $meaning:expr $(, $_cost:tt)?;)* })* }
+        masks { $($of_masks:ident { $($(#[$mask_docs:meta])* $mask:ident $masked:tt = $outcome:expr;)* })* }
     ) => {
         /// The function that an [`Instruction`](super::Instruction) computes from its operands a, b, ….
         #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -18,6 +18,12 @@ macro_rules! define {
             /// The number b where the mask a holds, c elsewhere.
             Select,
         }
+
+        /// The rows of the table, for those who write code: operation, operands, meaning, and section.
+        pub const ROWS: &[(Operation, &str, &str, &str)] = &[
+            $($((Operation::$name, stringify!($of), stringify!($meaning), stringify!($_section)),)*)*
+            $($((Operation::$mask, stringify!($masked), stringify!($outcome), stringify!($of_masks)),)*)*
+        ];
     };
 }
 

@@ -2,6 +2,7 @@
 
 mod audit;
 mod bench;
+mod emit;
 mod eval;
 mod output;
 mod policy;
@@ -12,6 +13,7 @@ mod targets;
 
 pub use audit::Audit;
 pub use bench::Bench;
+pub use emit::Emit;
 pub use eval::Eval;
 pub use reference::Reference;
 pub use show::Show;

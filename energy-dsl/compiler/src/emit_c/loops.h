@@ -1,0 +1,210 @@
+/* Numbers of many elements: number j of element i is numbers[i * per_element + j * per_number]. Element after element
+   has per_number = 1; a structure of arrays has per_element = 1; per_element = 0 is the same for all. */
+typedef struct {
+    const @real *numbers;
+    size_t per_element, per_number;
+} @column;
+
+/* How a result is stored. */
+#ifndef ENERGY_LAYOUTS
+#define ENERGY_LAYOUTS
+enum energy_layout {
+    /* As the routine returns it. */
+    ENERGY_AS_RETURNED,
+    /* A triangle of 3x3 blocks as the full matrix, row by row. */
+    ENERGY_FULL,
+    /* A triangle of 3x3 blocks as the upper triangle of numbers, row by row. */
+    ENERGY_TRIANGLE,
+    /* Added: number j to numbers[slots[i * per_element + j / block] * block + j % block], where a block has three numbers
+       of a gradient, nine of a Hessian, or one. ENERGY_NO_SLOT leaves a block out. */
+    ENERGY_ADDED,
+    /* Stored in the same places. On a GPU, sums depend on the order of threads; distinct slots do not. */
+    ENERGY_STORED
+};
+#define ENERGY_NO_SLOT UINT32_MAX
+#endif
+
+typedef struct {
+    /* NULL if the result is not wanted. */
+    @real *numbers;
+    size_t per_element, per_number;
+    enum energy_layout layout;
+    const uint32_t *slots;
+} @result;
+
+/* Elements to evaluate. */
+typedef struct {
+    size_t count;
+    /* Coordinates: of the elements, or, if there are stencils, of vertices, three each. */
+    @column x, v;
+    /* Vertices of each element, one after the other; NULL if each element has its own coordinates. */
+    const uint32_t *stencils;
+    @column parameters, stored;
+    @result results[3];
+    /* Flags of each element; may be NULL. */
+    unsigned char *flags;
+    /* Elements whose results only limits along rays can tell, and room for so many; may be NULL. */
+    uint32_t *unsettled;
+    size_t room;
+    /* Set by the call: the number of flagged elements, and of unsettled ones. */
+    size_t flagged, unsettled_count;
+    /* On a GPU, both are added to these two numbers instead. */
+    uint32_t *counts;
+} @batch;
+
+/* Reads the inputs of an element. */
+ENERGY_FN void @read(const @column *from, size_t element, int32_t count, @real *numbers) {
+    int32_t j;
+    for (j = 0; j < count; j++) {
+        numbers[j] = from->numbers[element * from->per_element + (size_t)j * from->per_number];
+    }
+}
+
+ENERGY_FN void @read_points(const @batch *batch, const @column *from, size_t element, int32_t count, @real *numbers) {
+    if (batch->stencils == NULL) {
+        @read(from, element, count, numbers);
+    } else {
+        const uint32_t *stencil = batch->stencils + element * (size_t)(count / 3);
+        int32_t j;
+        for (j = 0; j < count; j++) {
+            numbers[j] = from->numbers[3U * (size_t)stencil[j / 3] + (size_t)(j % 3)];
+        }
+    }
+}
+
+/* The place of entry (row, column) of a symmetric matrix in its triangle of 3x3 blocks. */
+ENERGY_FN int32_t @in_blocks(int32_t points, int32_t row, int32_t column) {
+    const int32_t i = row / 3 < column / 3 ? row / 3 : column / 3, j = row / 3 < column / 3 ? column / 3 : row / 3;
+    const int32_t r = row / 3 <= column / 3 ? row % 3 : column % 3, c = row / 3 <= column / 3 ? column % 3 : row % 3;
+    return 9 * (i * points - i * (i + 1) / 2 + j) + 3 * r + c;
+}
+
+/* Writes or adds a result of an element. `block` is the number of numbers that have a slot together. */
+ENERGY_FN void @write(const @result *to, size_t element, int32_t count, int32_t block, int32_t coordinates,
+                      const @real *numbers) {
+    int32_t row, column, j = 0;
+    if (to->numbers == NULL) {
+        return;
+    }
+    switch (to->layout) {
+    case ENERGY_FULL:
+    case ENERGY_TRIANGLE:
+        for (row = 0; row < coordinates; row++) {
+            for (column = to->layout == ENERGY_FULL ? 0 : row; column < coordinates; column++) {
+                to->numbers[element * to->per_element + (size_t)j * to->per_number] =
+                    numbers[@in_blocks(coordinates / 3, row, column)];
+                j++;
+            }
+        }
+        break;
+    case ENERGY_ADDED:
+    case ENERGY_STORED:
+        for (j = 0; j < count; j++) {
+            const uint32_t slot = to->slots[element * to->per_element + (size_t)(j / block)];
+            if (slot != ENERGY_NO_SLOT) {
+                @real *place = to->numbers + (size_t)slot * (size_t)block + (size_t)(j % block);
+                if (to->layout == ENERGY_STORED) {
+                    *place = numbers[j];
+                } else {
+#if defined(__CUDA_ARCH__)
+                    atomicAdd(place, numbers[j]);
+#else
+                    *place = *place + numbers[j];
+#endif
+                }
+            }
+        }
+        break;
+    case ENERGY_AS_RETURNED:
+    default:
+        for (j = 0; j < count; j++) {
+            to->numbers[element * to->per_element + (size_t)j * to->per_number] = numbers[j];
+        }
+        break;
+    }
+}
+
+#if defined(__CUDACC__)
+/* Notes the flags of an element on a GPU. */
+static __device__ __forceinline__ void @device_note(const @batch *batch, size_t element, unsigned flags) {
+    if (batch->flags != NULL) {
+        batch->flags[element] = (unsigned char)flags;
+    }
+    if (flags != 0U && batch->counts != NULL) {
+        atomicAdd(batch->counts, 1U);
+        if ((flags & ENERGY_UNSETTLED) != 0U) {
+            const uint32_t place = atomicAdd(batch->counts + 1, 1U);
+            if (batch->unsettled != NULL && place < batch->room) {
+                batch->unsettled[place] = (uint32_t)element;
+            }
+        }
+    }
+}
+#endif
+
+/* Notes the flags of an element. */
+ENERGY_FN void @note(@batch *batch, size_t element, unsigned flags) {
+    if (batch->flags != NULL) {
+        batch->flags[element] = (unsigned char)flags;
+    }
+    if (flags != 0U) {
+        batch->flagged++;
+    }
+    if ((flags & ENERGY_UNSETTLED) != 0U) {
+        if (batch->unsettled != NULL && batch->unsettled_count < batch->room) {
+            batch->unsettled[batch->unsettled_count] = (uint32_t)element;
+        }
+        batch->unsettled_count++;
+    }
+}
+
+/* Numbers of a result that have a slot together. */
+ENERGY_FN int32_t @slot_size(int32_t routine, int32_t place, int32_t count) {
+    const int32_t order = place + (routine == ENERGY_HESSIAN_VECTOR || routine == ENERGY_FORCE ||
+                                   routine == ENERGY_JACOBIANS ? 1 : 0);
+    return order == 0 || count % 3 != 0 ? 1 : (order == 1 || count % 9 != 0 ? 3 : 9);
+}
+
+/* Numbers of the points, or of the rest shape if these are more. */
+ENERGY_FN int32_t @moving(const @element *element) {
+    return element->coordinates > element->rest ? element->coordinates : element->rest;
+}
+
+/* Runs a routine of an element on many elements, in order. For ENERGY_REST, `batch->x` is the rest shape. `work` has room for all inputs and results of one. */
+ENERGY_FN void @run_each(const @element *element, int32_t routine, @batch *batch, size_t first, size_t count, @real *work) {
+    const int32_t *sizes = element->sizes[routine];
+    const int has_velocities =
+        routine == ENERGY_HESSIAN_VECTOR || routine == ENERGY_FORCE || routine == ENERGY_JACOBIANS;
+    @real *x = work, *v = x + @moving(element), *parameters = v + element->coordinates;
+    @real *stored = parameters + element->parameters;
+    @real *results[3];
+    const @real *arguments[4];
+    size_t i;
+    int32_t place;
+    results[0] = stored + element->stored;
+    results[1] = results[0] + sizes[0];
+    results[2] = results[1] + sizes[1];
+    arguments[0] = x;
+    arguments[1] = has_velocities ? v : parameters;
+    arguments[2] = has_velocities ? parameters : stored;
+    arguments[3] = stored;
+    for (i = first; i < first + count; i++) {
+        unsigned flags;
+        if (routine == ENERGY_REST) {
+            @read(&batch->x, i, element->rest, x);
+        } else {
+            @read_points(batch, &batch->x, i, element->coordinates, x);
+        }
+        if (has_velocities) {
+            @read_points(batch, &batch->v, i, element->coordinates, v);
+        }
+        @read(&batch->parameters, i, element->parameters, parameters);
+        @read(&batch->stored, i, element->stored, stored);
+        flags = element->run(routine, arguments, results);
+        for (place = 0; place < 3; place++) {
+            @write(&batch->results[place], i, sizes[place], @slot_size(routine, place, sizes[place]),
+                   element->coordinates, results[place]);
+        }
+        @note(batch, i, flags);
+    }
+}
