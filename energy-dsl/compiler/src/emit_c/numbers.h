@@ -33,6 +33,14 @@
 #else
 #define ENERGY_RESTRICT restrict
 #endif
+/* Hides where a number comes from. */
+#if defined(__GNUC__) && !defined(__clang__) && !defined(__CUDA_ARCH__) && defined(__FMA__)
+#define ENERGY_HIDE(a) __asm__("" : "+v"(a))
+#elif defined(__GNUC__) && !defined(__clang__) && !defined(__CUDA_ARCH__) && defined(__aarch64__)
+#define ENERGY_HIDE(a) __asm__("" : "+w"(a))
+#else
+#define ENERGY_HIDE(a) (void)0
+#endif
 /* Flags that routines return. Results are documented conventions where one is set. */
 /* A true singularity, or an input outside of the formula's domain. */
 #define ENERGY_DEGENERATE 1U
@@ -100,6 +108,13 @@ ENERGY_FN @real @mul_add(@real a, @real b, @real c) {
 }
 
 ENERGY_FN @real @neg(@real a) { return -a; }
+
+/* -a of a number that a fused operation computed. From -(x y + z), gcc makes (-x) y - z, which is 0 instead of -0 where
+   both terms cancel. */
+ENERGY_FN @real @negated(@real a) {
+    ENERGY_HIDE(a);
+    return -a;
+}
 ENERGY_FN @real @abs(@real a) { return @M_fabs(a); }
 ENERGY_FN @real @min(@real a, @real b) { return b < a ? b : a; }
 ENERGY_FN @real @max(@real a, @real b) { return b > a ? b : a; }
@@ -132,7 +147,7 @@ ENERGY_FN @real @difference_error(@real a, @real b) {
 ENERGY_FN @real @product_error(@real a, @real b) { return @mul_add(a, b, -@mul(a, b)); }
 
 /* a b - c, rounded once. */
-ENERGY_FN @real @fused_mul_sub(@real a, @real b, @real c) { return @mul_add(a, b, -c); }
+ENERGY_FN @real @fused_mul_sub(@real a, @real b, @real c) { return @mul_add(a, b, @negated(c)); }
 
 /* a - root^2, rounded once. */
 ENERGY_FN @real @root_error(@real a, @real root) { return @mul_add(-root, root, a); }

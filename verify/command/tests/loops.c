@@ -1,0 +1,156 @@
+/* Compares loops over the records of a file with single elements: one at a time, and in vectors. Each element has numbers
+   of its own, one after the other. */
+#include <stdio.h>
+#include <stdlib.h>
+#include "elements.h"
+
+static REAL *numbers(size_t count) {
+    REAL *list = (REAL *)calloc(count + 1, sizeof *list);
+    if (list == NULL) {
+        exit(2);
+    }
+    return list;
+}
+
+/* Reads all records of one element; returns how many there are. */
+static size_t records(FILE *file, int32_t wanted, REAL *inputs[4]) {
+    size_t count = 0;
+    int32_t number;
+    rewind(file);
+    while (fread(&number, sizeof number, 1, file) == 1) {
+        const ELEMENT *element = elements[number];
+        const int32_t sizes[4] = {element->rest, element->parameters, element->coordinates, element->coordinates};
+        int i;
+        for (i = 0; i < 4; i++) {
+            REAL *place = inputs[i] + (number == wanted ? count * (size_t)sizes[i] : 0);
+            if (number == wanted) {
+                if (fread(place, sizeof *place, (size_t)sizes[i], file) != (size_t)sizes[i]) {
+                    exit(2);
+                }
+            } else if (fseek(file, (long)((size_t)sizes[i] * sizeof(REAL)), SEEK_CUR) != 0) {
+                exit(2);
+            }
+        }
+        count += number == wanted ? 1U : 0U;
+    }
+    return count;
+}
+
+static int same(const REAL *a, const REAL *b, size_t count) {
+    size_t i;
+    for (i = 0; i < count; i++) {
+        if (memcmp(&a[i], &b[i], sizeof *a) != 0 && !(a[i] != a[i] && b[i] != b[i])) {
+            return 0;
+        }
+    }
+    return 1;
+}
+
+static COLUMN column(const REAL *list, int32_t size) {
+    COLUMN of;
+    of.numbers = list;
+    of.per_element = (size_t)size;
+    of.per_number = 1U;
+    return of;
+}
+
+int main(int argc, char **argv) {
+    const size_t most = 4096;
+    FILE *file = fopen(argv[argc - 1], "rb");
+    size_t compared = 0, flagged = 0;
+    int32_t e;
+    for (e = 0; e < (int32_t)(sizeof elements / sizeof *elements); e++) {
+        const ELEMENT *element = elements[e];
+        REAL *inputs[4], *stored = numbers(most * (size_t)element->stored), *sound[4], *kept;
+        const int32_t sizes[4] = {element->rest, element->parameters, element->coordinates, element->coordinates};
+        size_t count, i, good = 0;
+        int32_t routine;
+        int k;
+        for (k = 0; k < 4; k++) {
+            inputs[k] = numbers(most * (size_t)sizes[k]);
+            sound[k] = numbers(most * (size_t)sizes[k]);
+        }
+        count = records(file, e, inputs);
+        kept = numbers((size_t)element->stored);
+        for (i = 0; i < count; i++) {
+            const REAL *of_rest[2];
+            of_rest[0] = inputs[0] + i * (size_t)sizes[0];
+            of_rest[1] = inputs[1] + i * (size_t)sizes[1];
+            if (element->run(ENERGY_REST, of_rest, &kept) == 0U) {
+                memcpy(stored + good * (size_t)element->stored, kept, (size_t)element->stored * sizeof *kept);
+                for (k = 0; k < 4; k++) {
+                    memcpy(sound[k] + good * (size_t)sizes[k], inputs[k] + i * (size_t)sizes[k], (size_t)sizes[k] * sizeof(REAL));
+                }
+                good++;
+            }
+        }
+        for (routine = ENERGY_REST + 1; routine < ENERGY_ROUTINES; routine++) {
+            const int32_t *results = element->sizes[routine];
+            const int has_velocities = routine == ENERGY_HESSIAN_VECTOR || routine == ENERGY_FORCE || routine == ENERGY_JACOBIANS;
+            REAL *of_each[3], *of_loops[2][3];
+            unsigned char *flags[3];
+            BATCH batch;
+            int way;
+            if (results[0] + results[1] + results[2] == 0) {
+                continue;
+            }
+            memset(&batch, 0, sizeof batch);
+            batch.count = good;
+            batch.x = column(sound[2], sizes[2]);
+            batch.v = column(sound[3], sizes[3]);
+            batch.parameters = column(sound[1], sizes[1]);
+            batch.stored = column(stored, element->stored);
+            for (k = 0; k < 3; k++) {
+                of_each[k] = numbers(good * (size_t)results[k]);
+                flags[k] = (unsigned char *)calloc(good + 1, 1);
+            }
+            for (i = 0; i < good; i++) {
+                const REAL *arguments[4];
+                REAL *places[3];
+                for (k = 0; k < 3; k++) {
+                    places[k] = of_each[k] + i * (size_t)results[k];
+                }
+                arguments[0] = sound[2] + i * (size_t)sizes[2];
+                arguments[1] = has_velocities ? sound[3] + i * (size_t)sizes[3] : sound[1] + i * (size_t)sizes[1];
+                arguments[2] = has_velocities ? sound[1] + i * (size_t)sizes[1] : stored + i * (size_t)element->stored;
+                arguments[3] = stored + i * (size_t)element->stored;
+                flags[0][i] = (unsigned char)element->run(routine, arguments, places);
+                flagged += flags[0][i] != 0 ? 1U : 0U;
+            }
+            for (way = 0; way < 2; way++) {
+                for (k = 0; k < 3; k++) {
+                    of_loops[way][k] = numbers(good * (size_t)results[k]);
+                    batch.results[k].numbers = of_loops[way][k];
+                    batch.results[k].per_element = (size_t)results[k];
+                    batch.results[k].per_number = 1U;
+                }
+                batch.flags = flags[way + 1];
+                (way == 0 ? plain : in_lanes)[e](routine, &batch);
+                for (k = 0; k < 3; k++) {
+                    if (!same(of_each[k], of_loops[way][k], good * (size_t)results[k])) {
+                        printf("%s, routine %d, result %d, way %d: other bits\n", element->name, routine, k, way); { size_t q; int n = 0; for (q = 0; q < good * (size_t)results[k] && n < 12; q++) if (!same(of_each[k] + q, of_loops[way][k] + q, 1)) { n++; printf("%lu of element %lu: %.17g %.17g\n", (unsigned long)(q % (size_t)results[k]), (unsigned long)(q / (size_t)results[k]), of_each[k][q], of_loops[way][k][q]); } }
+                        return 1;
+                    }
+                    free(of_loops[way][k]);
+                }
+                if (memcmp(flags[0], flags[way + 1], good) != 0) {
+                    printf("%s, routine %d, way %d: other flags\n", element->name, routine, way);
+                    return 1;
+                }
+            }
+            compared += good;
+            for (k = 0; k < 3; k++) {
+                free(of_each[k]);
+                free(flags[k]);
+            }
+        }
+        for (k = 0; k < 4; k++) {
+            free(inputs[k]);
+            free(sound[k]);
+        }
+        free(stored);
+        free(kept);
+    }
+    printf("%lu results compared, %lu of them flagged\n", (unsigned long)compared, (unsigned long)flagged);
+    return 0;
+}
