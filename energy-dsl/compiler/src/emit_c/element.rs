@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use super::dialect::{Dialect, Numbers};
-use super::expression::{Meanings, is_fused, statement};
+use super::expression::{Meanings, statement};
 use crate::graph::{Input, NodeId, Op};
 use crate::interpreted::{InputKind, InputNumbers};
 use crate::plan::{Code, Plan, RoutinePlan, groups};
@@ -507,9 +507,7 @@ impl Element<'_> {
         let mut written = Written(Vec::with_capacity(list.len()));
         let mut computed = 0;
         for &op in list {
-            // An input of an expansion is a result of the reduced routine, and may be one of a fused operation.
-            let is_fused = |place: NodeId| is_fused(list[place.0 as usize]) || matches!(list[place.0 as usize], Op::Input(_));
-            let name = match (op, statement(dialect, self.meanings, op, |place| (written.name(place), is_fused(place)))) {
+            let name = match (op, statement(dialect, self.meanings, op, |place| written.name(place))) {
                 (Op::Input(input), _) => read(input),
                 (Op::Constant(_) | Op::Pi | Op::Truth(_), Some(value)) => value,
                 (_, Some(value)) => {

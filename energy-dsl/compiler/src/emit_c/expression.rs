@@ -10,33 +10,6 @@ use syn::{BinOp, Expr, UnOp};
 use super::dialect::{Dialect, Numbers};
 use crate::graph::{NodeId, Op};
 
-/// An operand: its name, and whether a fused operation computed it.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Operand<'a> {
-    pub(super) name: &'a str,
-    pub(super) is_fused: bool,
-}
-
-impl<'a> Operand<'a> {
-    pub(super) fn new(name: &'a str, is_fused: bool) -> Self {
-        Self { name, is_fused }
-    }
-}
-
-/// Returns whether an operation is fused.
-pub(super) fn is_fused(op: Op) -> bool {
-    matches!(
-        op,
-        Op::MulAdd(..)
-            | Op::MulSub(..)
-            | Op::NegMulAdd(..)
-            | Op::NegMulSub(..)
-            | Op::FusedMulSub(..)
-            | Op::ProductError(..)
-            | Op::RootError(..)
-    )
-}
-
 /// An expression of named functions.
 #[derive(Debug)]
 pub(super) enum Expression {
@@ -102,13 +75,10 @@ impl Expression {
     }
 
     /// Writes the expression.
-    pub(super) fn written(&self, dialect: Dialect, operands: &[Operand<'_>], text: &mut String) {
+    pub(super) fn written(&self, dialect: Dialect, operands: &[&str], text: &mut String) {
         match self {
-            Self::Operand(place) => text.push_str(operands[*place].name),
+            Self::Operand(place) => text.push_str(operands[*place]),
             Self::Call(name, list) => match (dialect.infix(name), &list[..]) {
-                (Some("-"), [Self::Operand(place)]) if operands[*place].is_fused => {
-                    text.push_str(&dialect.call("negated", &[operands[*place].name]));
-                }
                 (Some(sign), [a]) => {
                     text.push_str(sign);
                     a.factor(dialect, operands, text);
@@ -130,7 +100,7 @@ impl Expression {
         }
     }
 
-    fn factor(&self, dialect: Dialect, operands: &[Operand<'_>], text: &mut String) {
+    fn factor(&self, dialect: Dialect, operands: &[&str], text: &mut String) {
         let needs_brackets = matches!(self, Self::Call(name, _) if dialect.infix(name).is_some());
         text.push_str(if needs_brackets { "(" } else { "" });
         self.written(dialect, operands, text);
@@ -139,29 +109,22 @@ impl Expression {
 }
 
 /// Returns the expression of a statement; `None` for an input, which is read in place. `name` returns the name of an
-/// earlier statement, and whether its result may be that of a fused operation.
-pub(super) fn statement(
-    dialect: Dialect,
-    meanings: &Meanings,
-    op: Op,
-    name: impl Fn(NodeId) -> (String, bool),
-) -> Option<String> {
+/// earlier statement.
+pub(super) fn statement(dialect: Dialect, meanings: &Meanings, op: Op, name: impl Fn(NodeId) -> String) -> Option<String> {
     let call = |function: &str, arguments: &[&str]| Some(dialect.call(function, arguments));
-    let named = |place: NodeId| name(place).0;
     match op {
         Op::Input(_) => None,
         Op::Constant(bits) => Some(dialect.constant(f64::from_bits(bits))),
         Op::Pi => Some(dialect.constant(std::f64::consts::PI)),
         Op::Truth(value) => Some(dialect.truth(value)),
-        Op::IsModerate(a, degree) => call("is_moderate", &[&named(a), &degree.to_string()]),
+        Op::IsModerate(a, degree) => call("is_moderate", &[&name(a), &degree.to_string()]),
         Op::Select(mask, a, b) if dialect.numbers == Numbers::Plain => {
-            Some(format!("{} ? {} : {}", named(mask), named(a), named(b)))
+            Some(format!("{} ? {} : {}", name(mask), name(a), name(b)))
         }
-        Op::Select(mask, a, b) => call("select", &[&named(mask), &named(a), &named(b)]),
+        Op::Select(mask, a, b) => call("select", &[&name(mask), &name(a), &name(b)]),
         _ => {
-            let operands: Vec<(String, bool)> = op.operands().map(name).collect();
-            let operands: Vec<Operand<'_>> =
-                operands.iter().map(|(name, is_fused)| Operand::new(name, *is_fused)).collect();
+            let operands: Vec<String> = op.operands().map(name).collect();
+            let operands: Vec<&str> = operands.iter().map(String::as_str).collect();
             let mut text = String::new();
             meanings.of(op).written(dialect, &operands, &mut text);
             Some(text)

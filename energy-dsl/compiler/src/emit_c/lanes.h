@@ -54,9 +54,11 @@ ENERGY_FN @lanes @lanes_sqrt(@lanes a) {
 ENERGY_FN @lanes @lanes_mul_add(@lanes a, @lanes b, @lanes c) {
     @lanes sum;
     int i;
+    ENERGY_HIDE_ON_ARM(c);
     for (i = 0; i < @LANES; i++) {
         sum[i] = __builtin_@M_fma(a[i], b[i], c[i]);
     }
+    ENERGY_HIDE(sum);
     return sum;
 }
 
@@ -67,11 +69,6 @@ ENERGY_FN @lanes @lanes_select(@lane_mask mask, @lanes yes, @lanes no) {
 ENERGY_FN @lanes @lanes_abs(@lanes a) { return (@lanes)((@lane_bits)a << 1 >> 1); }
 ENERGY_FN @lanes @lanes_min(@lanes a, @lanes b) { return @lanes_select(b < a, b, a); }
 ENERGY_FN @lanes @lanes_max(@lanes a, @lanes b) { return @lanes_select(b > a, b, a); }
-
-ENERGY_FN @lanes @lanes_negated(@lanes a) {
-    ENERGY_HIDE(a);
-    return -a;
-}
 
 ENERGY_FN @lanes @lanes_sum_error(@lanes a, @lanes b) {
     const @lanes sum = a + b;
@@ -86,9 +83,7 @@ ENERGY_FN @lanes @lanes_difference_error(@lanes a, @lanes b) {
 }
 
 ENERGY_FN @lanes @lanes_product_error(@lanes a, @lanes b) { return @lanes_mul_add(a, b, -(a * b)); }
-ENERGY_FN @lanes @lanes_fused_mul_sub(@lanes a, @lanes b, @lanes c) {
-    return @lanes_mul_add(a, b, @lanes_negated(c));
-}
+ENERGY_FN @lanes @lanes_fused_mul_sub(@lanes a, @lanes b, @lanes c) { return @lanes_mul_add(a, b, -c); }
 ENERGY_FN @lanes @lanes_root_error(@lanes a, @lanes root) { return @lanes_mul_add(-root, root, a); }
 
 ENERGY_FN @lanes @lanes_and(@lanes a, @lanes b) { return (@lanes)((@lane_bits)a & (@lane_bits)b); }

@@ -33,13 +33,24 @@
 #else
 #define ENERGY_RESTRICT restrict
 #endif
-/* Hides where a number comes from. */
-#if defined(__GNUC__) && !defined(__clang__) && !defined(__CUDA_ARCH__) && defined(__FMA__)
+/* Hides where a number comes from. Compilers take -(x y + z) and (-x) y - z for each other: gcc wherever there are fused
+   operations, clang on processors of ARM. But where both terms cancel, one of them is 0, and the other is -0. */
+#if !defined(__GNUC__) || defined(__CUDA_ARCH__)
+#define ENERGY_HIDE(a) (void)0
+#define ENERGY_HIDE_ON_ARM(a) (void)0
+#elif defined(__x86_64__) || defined(__i386__)
+#if defined(__FMA__) && !defined(__clang__)
 #define ENERGY_HIDE(a) __asm__("" : "+v"(a))
-#elif defined(__GNUC__) && !defined(__clang__) && !defined(__CUDA_ARCH__) && defined(__aarch64__)
-#define ENERGY_HIDE(a) __asm__("" : "+w"(a))
 #else
 #define ENERGY_HIDE(a) (void)0
+#endif
+#define ENERGY_HIDE_ON_ARM(a) (void)0
+#elif defined(__aarch64__)
+#define ENERGY_HIDE(a) __asm__("" : "+w"(a))
+#define ENERGY_HIDE_ON_ARM(a) ENERGY_HIDE(a)
+#else
+#define ENERGY_HIDE(a) __asm__("" : "+m"(a))
+#define ENERGY_HIDE_ON_ARM(a) ENERGY_HIDE(a)
 #endif
 /* Flags that routines return. Results are documented conventions where one is set. */
 /* A true singularity, or an input outside of the formula's domain. */
@@ -101,20 +112,17 @@ ENERGY_FN @real @mul_add(@real a, @real b, @real c) {
 #if defined(__CUDA_ARCH__)
     return @I_fma(a, b, c);
 #elif defined(__GNUC__)
-    return __builtin_@M_fma(a, b, c);
+    @real sum;
+    ENERGY_HIDE_ON_ARM(c);
+    sum = __builtin_@M_fma(a, b, c);
+    ENERGY_HIDE(sum);
+    return sum;
 #else
     return @M_fma(a, b, c);
 #endif
 }
 
 ENERGY_FN @real @neg(@real a) { return -a; }
-
-/* -a of a number that a fused operation computed. From -(x y + z), gcc makes (-x) y - z, which is 0 instead of -0 where
-   both terms cancel. */
-ENERGY_FN @real @negated(@real a) {
-    ENERGY_HIDE(a);
-    return -a;
-}
 ENERGY_FN @real @abs(@real a) { return @M_fabs(a); }
 ENERGY_FN @real @min(@real a, @real b) { return b < a ? b : a; }
 ENERGY_FN @real @max(@real a, @real b) { return b > a ? b : a; }
@@ -147,7 +155,7 @@ ENERGY_FN @real @difference_error(@real a, @real b) {
 ENERGY_FN @real @product_error(@real a, @real b) { return @mul_add(a, b, -@mul(a, b)); }
 
 /* a b - c, rounded once. */
-ENERGY_FN @real @fused_mul_sub(@real a, @real b, @real c) { return @mul_add(a, b, @negated(c)); }
+ENERGY_FN @real @fused_mul_sub(@real a, @real b, @real c) { return @mul_add(a, b, -c); }
 
 /* a - root^2, rounded once. */
 ENERGY_FN @real @root_error(@real a, @real root) { return @mul_add(-root, root, a); }

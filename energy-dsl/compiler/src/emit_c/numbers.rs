@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use super::dialect::{Dialect, Numbers, Precision};
-use super::expression::{Expression, Operand};
+use super::expression::Expression;
 use energy_runtime::{MASKS, RoutineKind, Trace, TraceStep, elementary_functions};
 
 /// Returns the text of the header of scalars.
@@ -64,12 +64,7 @@ fn function(dialect: Dialect, trace: &Trace) -> String {
             TraceStep::Argument(number) => ["a", "b"][*number].to_owned(),
             TraceStep::Constant(value) => dialect.constant(*value),
             TraceStep::Operation(name, operands) => {
-                let is_fused = |operand: usize| {
-                    let fused = ["mul_add", "product_error", "fused_mul_sub", "select"];
-                    matches!(&trace.steps[operand], TraceStep::Operation(name, _) if fused.contains(name))
-                };
-                let operand = |&operand: &usize| Operand::new(&names[operand], is_fused(operand));
-                let list: Vec<Operand<'_>> = operands.iter().map(operand).collect();
+                let list: Vec<&str> = operands.iter().map(|&operand| names[operand].as_str()).collect();
                 let call = Expression::Call((*name).to_owned(), (0..list.len()).map(Expression::Operand).collect());
                 let mut value = String::new();
                 call.written(dialect, &list, &mut value);

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 
 use super::dialect::{Dialect, Numbers, Precision};
 use super::element::{Element, Function};
-use super::expression::{Expression, Operand};
+use super::expression::Expression;
 use crate::plan::GeneralPlan;
 use crate::tape::record;
 use energy_runtime::tape::{Instruction, Operation, ROWS};
@@ -37,7 +37,7 @@ pub(super) fn interpreter(precision: Precision) -> String {
         let names = names(list);
         let (is_mask, of_masks) = (matches!(*section, "comparisons" | "connectives"), *section == "connectives");
         let reads: Vec<String> = (0..names.len()).map(|number| place(if of_masks { "m" } else { "n" }, number)).collect();
-        let reads: Vec<Operand<'_>> = reads.iter().map(|name| Operand::new(name, false)).collect();
+        let reads: Vec<&str> = reads.iter().map(String::as_str).collect();
         let mut value = String::new();
         Expression::of_text(meaning, &names).written(dialect, &reads, &mut value);
         let target = match is_mask {
