@@ -311,7 +311,29 @@ impl Element<'_> {
         );
         let _ = writeln!(text, "    {}(reduced_gradient, reduced_hessian, gradient, hessian);", self.named("expand"));
         text.push_str("    return flags;\n}\n\n");
+        if is_scalar {
+            text.push_str(&self.projected(&hessian));
+        }
         text
+    }
+
+    /// Writes the function of the positive semi-definite Hessian.
+    fn projected(&self, hessian: &Function) -> String {
+        let (real, coordinates) = (self.dialect.precision.real(), self.plan.coordinates);
+        let (numbers, points) = (hessian.results[2].size, coordinates / 3);
+        let signature = self.signature(hessian, false);
+        let inputs: Vec<&str> = hessian.arguments.iter().map(|argument| argument.name).collect();
+        format!(
+            "/* As {name}_hessian, but the Hessian is a full matrix, row by row, whose negative eigenvalues are 0. \
+             */\nENERGY_ROUTINE unsigned {name}_projected_hessian({signature}) {{\n    {real} triangle[{numbers}], \
+             work[{work}];\n    const unsigned flags = {name}_hessian({inputs}, value, gradient, triangle);\n    \
+             {full};\n    (void){project};\n    return flags;\n}}\n\n",
+            name = self.name,
+            work = 2 * coordinates * coordinates,
+            inputs = inputs.join(", "),
+            full = self.dialect.call("full_matrix", &[&points.to_string(), "triangle", "hessian"]),
+            project = self.dialect.call("project", &["hessian", "work", &coordinates.to_string()]),
+        )
     }
 
     /// Writes the function that runs a routine by number over vectors.

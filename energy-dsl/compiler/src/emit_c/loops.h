@@ -72,13 +72,6 @@ ENERGY_FN void @read_points(const @batch *batch, const @column *from, size_t ele
     }
 }
 
-/* The place of entry (row, column) of a symmetric matrix in its triangle of 3x3 blocks. */
-ENERGY_FN int32_t @in_blocks(int32_t points, int32_t row, int32_t column) {
-    const int32_t i = row / 3 < column / 3 ? row / 3 : column / 3, j = row / 3 < column / 3 ? column / 3 : row / 3;
-    const int32_t r = row / 3 <= column / 3 ? row % 3 : column % 3, c = row / 3 <= column / 3 ? column % 3 : row % 3;
-    return 9 * (i * points - i * (i + 1) / 2 + j) + 3 * r + c;
-}
-
 /* Writes or adds a result of an element. `block` is the number of numbers that have a slot together. */
 ENERGY_FN void @write(const @result *to, size_t element, int32_t count, int32_t block, int32_t coordinates,
                       const @real *numbers) {

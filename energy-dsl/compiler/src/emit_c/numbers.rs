@@ -14,7 +14,7 @@ pub(super) fn header(precision: Precision) -> String {
     };
     let functions = functions(Dialect { precision, numbers: Numbers::Plain, operators: false });
     let interpreter = super::tape::interpreter(precision);
-    let parts = [include_str!("numbers.h"), "\n", huge, include_str!("huge.h"), &functions, "\n", include_str!("wide.h"), "\n", &interpreter];
+    let parts = [include_str!("numbers.h"), "\n", huge, include_str!("huge.h"), &functions, "\n", include_str!("wide.h"), "\n", &interpreter, "\n", include_str!("project.h")];
     let includes = "#include <float.h>\n#include <math.h>\n#include <stddef.h>\n#include <stdint.h>\n#include \
                     <string.h>\n\n";
     guarded(precision, "", includes, &parts)
