@@ -32,6 +32,24 @@ ENERGY_FN void @lanes_read_points(const @batch *batch, const @column *from, size
     }
 }
 
+/* Writes a result of a vector of elements, if all of its lanes are stored as they are returned. Returns whether they
+   are. */
+ENERGY_FN int @lanes_write(const @result *to, size_t first, int32_t count, const @lanes *numbers) {
+    @real *place = to->numbers + first * to->per_element;
+    int32_t j, lane;
+    if (to->layout != ENERGY_AS_RETURNED) {
+        return 0;
+    }
+    for (lane = 0; lane < @LANES; lane++) {
+        @real *row = place + (size_t)lane * to->per_element;
+        const @real *from = (const @real *)(const void *)numbers + lane;
+        for (j = 0; j < count; j++) {
+            row[(size_t)j * to->per_number] = from[(size_t)j * @LANES];
+        }
+    }
+    return 1;
+}
+
 /* Runs a routine of an element on many elements. `work` has room for all inputs and results of one vector of elements,
    `single` for those of one element. Results are written or added in the order of the elements. */
 ENERGY_FN void @run_lanes(const @element *element, @lanes_run *run, int32_t routine, @batch *batch, @lanes *work,
@@ -46,6 +64,7 @@ ENERGY_FN void @run_lanes(const @element *element, @lanes_run *run, int32_t rout
     const size_t whole = routine == ENERGY_REST ? 0U : batch->count - batch->count % @LANES;
     size_t first;
     int32_t place, j, lane;
+    int is_written[3];
     results[0] = stored + element->stored;
     results[1] = results[0] + sizes[0];
     results[2] = results[1] + sizes[1];
@@ -64,13 +83,17 @@ ENERGY_FN void @run_lanes(const @element *element, @lanes_run *run, int32_t rout
         }
         @lanes_read(&batch->stored, first, element->stored, stored);
         rare = run(routine, arguments, results);
+        for (place = 0; place < 3; place++) {
+            is_written[place] = batch->results[place].numbers == NULL ||
+                                @lanes_write(&batch->results[place], first, sizes[place], results[place]);
+        }
         for (lane = 0; lane < @LANES; lane++) {
             if ((rare >> lane & 1U) != 0U) {
                 @run_each(element, routine, batch, first + (size_t)lane, 1U, single);
                 continue;
             }
             for (place = 0; place < 3; place++) {
-                if (batch->results[place].numbers != NULL) {
+                if (!is_written[place]) {
                     for (j = 0; j < sizes[place]; j++) {
                         single[j] = results[place][j][lane];
                     }

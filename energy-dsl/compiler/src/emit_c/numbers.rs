@@ -57,7 +57,7 @@ fn routines() -> String {
 fn function(dialect: Dialect, trace: &Trace) -> String {
     let number = dialect.of_type(false);
     let arguments = ["a", "b"][..trace.arguments].iter().map(|name| format!("{number} {name}")).collect::<Vec<_>>();
-    let mut text = format!("\nENERGY_RARE {number} {}{}({}) {{\n", dialect.prefix(), trace.name, arguments.join(", "));
+    let mut text = format!("\nENERGY_ROUTINE {number} {}{}({}) {{\n", dialect.prefix(), trace.name, arguments.join(", "));
     let mut names: Vec<String> = Vec::with_capacity(trace.steps.len());
     for (place, step) in trace.steps.iter().enumerate() {
         names.push(match step {

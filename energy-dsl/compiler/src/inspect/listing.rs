@@ -146,8 +146,8 @@ impl Listing {
             writeln!(text, "  {name:<32} {:>10}  {:>12}", count.total(), count.instructions())
                 .expect("writing to a string succeeds");
         };
-        for routine in &self.routines.list {
-            row(routine.kind.name(), self.routines.count(&routine.outputs()));
+        for (graph, routine) in self.routines.all() {
+            row(routine.kind.name(), self.routines.count(graph, &routine.outputs()));
         }
         let hessian = self.routines.find(RoutineKind::Hessian);
         let Some([value, gradient, triangle]) = hessian.map(|routine| &routine.groups[..]) else { return text };
@@ -159,7 +159,7 @@ impl Listing {
             for (_, block) in pairs.zip(triangle.chunks(9)).filter(|((i, j), _)| *i != pinned && *j != pinned) {
                 outputs.extend(block);
             }
-            row(&format!("hessian, point {pinned} pinned"), self.routines.count(&outputs));
+            row(&format!("hessian, point {pinned} pinned"), self.routines.count(&self.routines.graph, &outputs));
         }
         text
     }

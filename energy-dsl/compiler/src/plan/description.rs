@@ -14,10 +14,10 @@ pub(super) fn description(program: &Program, routines: &Routines) -> Declaration
     let declared = &program.parameters[..program.parameters.len() - implied];
     let docs: Vec<&str> = program.docs.iter().map(|line| line.strip_prefix(' ').unwrap_or(line)).collect();
     let Character { curved, quadratic, velocity_dependent, symmetric } = character(program, routines);
-    let list = routines.list.iter().map(|routine| Routine {
+    let list = routines.all().map(|(graph, routine)| Routine {
         name: routine.kind.name(),
-        reduced: routines.count(&routine.reduced_outputs()),
-        full: routines.count(&routine.outputs()),
+        reduced: routines.count(graph, &routine.reduced_outputs()),
+        full: routines.count(graph, &routine.outputs()),
     });
     Declaration {
         name: Cow::Owned(program.name.clone()),

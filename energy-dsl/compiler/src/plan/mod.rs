@@ -46,14 +46,14 @@ impl Plan {
             Code::new(&expansion.graph, &[expansion.gradient.clone(), expansion.triangle.clone()], [None, None])
         });
         let is_expanded = |kind: RoutineKind| kind == RoutineKind::Hessian && expansion.is_some();
-        let list = routines.list.iter().filter(|routine| !is_expanded(routine.kind));
+        let list = routines.all().filter(|(_, routine)| !is_expanded(routine.kind));
         Self {
             declaration: Arc::new(description::description(program, routines)),
             coordinates: program.moving_size(),
             parameters: program.parameters_size(),
             shape: program.rest.iter().map(|input| input.input_type.size()).sum(),
             rest: RoutinePlan::of_rest(routines),
-            routines: list.map(|routine| RoutinePlan::new(routines, routine)).collect(),
+            routines: list.map(|(graph, routine)| RoutinePlan::new(routines, graph, routine)).collect(),
             expansion,
             repetition: routines.repetition.clone(),
         }

@@ -33,8 +33,7 @@ pub(crate) struct GeneralPlan {
 }
 
 impl RoutinePlan {
-    pub(super) fn new(routines: &Routines, routine: &Routine) -> Self {
-        let graph = &routines.graph;
+    pub(super) fn new(routines: &Routines, graph: &Graph, routine: &Routine) -> Self {
         let is_summed = routine.kind == RoutineKind::ReducedHessian && routines.vectors.len() > 1;
         let summed = if is_summed { 1 } else { routine.groups.len() };
         let general = routine.general.as_ref().map(|general| GeneralPlan::new(graph, general, summed));

@@ -170,6 +170,8 @@ pub struct Routines {
     pub primitives: Vec<&'static str>,
     /// Routes to the derivatives of each routine.
     pub routes: Vec<Routes>,
+    /// The routines of single vertices; `None` if they are not wanted.
+    pub vertices: Option<Vertices>,
 }
 
 impl Routines {
@@ -179,10 +181,17 @@ impl Routines {
         self.list.iter().find(|routine| routine.kind == kind)
     }
 
+    /// Returns all routines, each with its graph.
+    pub fn all(&self) -> impl Iterator<Item = (&Graph, &Routine)> {
+        let own = self.list.iter().map(|routine| (&self.graph, routine));
+        let of_vertices = self.vertices.iter().flat_map(|all| all.list.iter().map(|routine| (&all.graph, routine)));
+        own.chain(of_vertices)
+    }
+
     /// Counts the operations that compute some outputs, in all terms of a sum.
     #[must_use]
-    pub fn count(&self, outputs: &[NodeId]) -> OperationCount {
-        count(&self.graph, outputs).times(self.repetition.as_ref().map_or(1, Repetition::terms))
+    pub fn count(&self, graph: &Graph, outputs: &[NodeId]) -> OperationCount {
+        count(graph, outputs).times(self.repetition.as_ref().map_or(1, Repetition::terms))
     }
 }
 
@@ -261,10 +270,8 @@ pub fn differentiate(
         Kind::Residual => residual(g, &outputs, &coordinates, &mut routes),
     };
     let primitives = primitives(g, &outputs, &list);
-    let mut list = list;
-    if program.vertices {
-        list.extend(vertices(g, list[0].groups[0][0], &coordinates, program.points(), &mut routes));
-    }
+    let vertices =
+        program.vertices.then(|| Vertices::new(g, list[0].groups[0][0], &coordinates, program.points(), &mut routes));
     let list = list.into_iter().map(|whole| whole.split(g)).collect();
     Routines {
         rest,
@@ -277,6 +284,7 @@ pub fn differentiate(
         translation_invariant: coordinates.translation_invariant,
         primitives,
         routes,
+        vertices,
         graph,
         repetition,
     }
@@ -318,7 +326,31 @@ fn potential(
     ]
 }
 
-/// Creates the value and its derivatives by each point alone.
+/// The value and its derivatives by each point alone. They have a graph of their own: a number that they, too, would use
+/// might round otherwise in the other routines.
+#[derive(Clone, Debug)]
+pub struct Vertices {
+    /// The graph.
+    pub graph: Graph,
+    /// One routine for each point.
+    pub list: Vec<Routine>,
+}
+
+impl Vertices {
+    fn new(
+        graph: &Graph,
+        value: NodeId,
+        coordinates: &Coordinates,
+        points: usize,
+        routes: &mut Vec<Routes>,
+    ) -> Self {
+        let mut graph = graph.clone();
+        let list = vertices(&mut graph, value, coordinates, points, routes);
+        let list = list.into_iter().map(|whole| whole.split(&mut graph)).collect();
+        Self { graph, list }
+    }
+}
+
 fn vertices(
     g: &mut Graph,
     value: NodeId,
