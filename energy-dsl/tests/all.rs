@@ -18,3 +18,4 @@ mod recognition;
 mod reference;
 mod singular;
 mod ui;
+mod vertex;

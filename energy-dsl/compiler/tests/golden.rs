@@ -87,6 +87,7 @@ fn claims_are_proved_or_refused() {
         ("#[audit(domain(k = 1, 2))] energy A(p: Point; k: Scalar) { k * norm(p) }", "between the ends of the range"),
         ("#[audit(tolerance = 0.5)] energy A(p: Point) { norm(p) }", "a relative error from 0 to 1e-3"),
         ("#[odd] energy A(p: Point) { norm(p) }", "unknown attribute `odd`"),
+        ("#[vertex] force A(p: Point) { p }", "a force has no routines of single vertices"),
         ("#[uncompensated] fn f(a) { a } energy A(p: Point) { f(norm(p)) }", "a declaration after its attributes"),
     ] {
         let code = compile(source.parse().unwrap()).to_string();

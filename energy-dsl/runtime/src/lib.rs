@@ -44,7 +44,8 @@ pub use numbers::{
 };
 #[doc(hidden)]
 pub use numbers::{
-    Care, GeneralPath, MASKS, Precautions, Ray, Roles, Trace, TraceStep, WithCare, elementary_functions, settle, with_care,
+    Care, GeneralPath, MASKS, Precautions, Ray, Roles, Trace, TraceStep, WithCare, elementary_functions, settle,
+    with_care,
 };
 pub use results::{
     ConstraintHessian, ConstraintJacobian, ForceJacobians, ForceValue, Gradient, Hessian, HessianVector,

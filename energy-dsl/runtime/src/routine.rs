@@ -124,12 +124,7 @@ impl RoutineKind {
     pub const fn is_energy(self) -> bool {
         matches!(
             self,
-            Self::Value
-                | Self::Gradient
-                | Self::Hessian
-                | Self::ReducedHessian
-                | Self::GaussNewton
-                | Self::Vertex(_)
+            Self::Value | Self::Gradient | Self::Hessian | Self::ReducedHessian | Self::GaussNewton | Self::Vertex(_)
         )
     }
 }

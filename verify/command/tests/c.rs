@@ -111,7 +111,8 @@ impl<S: Bits> Case<S> {
         let numbers = |list: &[f64]| list.iter().map(|&x| S::of(x)).collect::<Vec<S>>();
         let mut velocities = numbers(&sample.velocities);
         velocities.resize(of.coordinates(), S::of(0.0));
-        let [parameters, rest, positions] = [&sample.parameters, &sample.rest, &sample.positions].map(|list| numbers(list));
+        let [parameters, rest, positions] =
+            [&sample.parameters, &sample.rest, &sample.positions].map(|list| numbers(list));
         Self { element, parameters, rest, positions, velocities }
     }
 
@@ -265,8 +266,7 @@ fn check<S: Bits>(compiler: &Compiler, name: &str) {
         println!("skipped: this processor has no fused operations");
         return;
     }
-    let elements: Vec<Interpreted> =
-        catalogue::elements().iter().map(|entry| interpreted(entry.declaration)).collect();
+    let elements: Vec<Interpreted> = catalogue::elements().iter().map(|entry| interpreted(entry.declaration)).collect();
     let folder = folder(name);
     let text: String = catalogue::elements().iter().map(|entry| format!("{}\n", entry.declaration.source)).collect();
     std::fs::write(folder.join("elements.energy"), text).unwrap();
@@ -276,7 +276,8 @@ fn check<S: Bits>(compiler: &Compiler, name: &str) {
     std::fs::write(&records, cases.iter().flat_map(Case::bytes).collect::<Vec<u8>>()).unwrap();
     let output = Command::new(program).arg(&records).output().unwrap();
     assert!(output.status.success(), "{}", output.status);
-    let of = |entry: &energy_dsl::AnyElement| Interpreted::from_source(&entry.declaration.source).unwrap().pop().unwrap();
+    let of =
+        |entry: &energy_dsl::AnyElement| Interpreted::from_source(&entry.declaration.source).unwrap().pop().unwrap();
     let plain: Vec<Interpreted> = catalogue::elements().iter().map(of).collect();
     let counts = compare(&elements, &plain, &cases, &output.stdout);
     println!("{name}: {} inputs, {counts:?}", cases.len());
@@ -292,4 +293,70 @@ fn c_has_the_bits_of_rust() {
 #[test]
 fn c_in_single_precision_has_the_bits_of_rust() {
     check::<f32>(&Compiler { command: &["gcc", "-std=c99"] }, "c-f32");
+}
+
+/// Loops over elements, one at a time and in vectors, have the bits of single calls. Every fifth element suffices: the
+/// loops are the same for all.
+#[test]
+fn loops_have_the_bits_of_single_elements() {
+    loops::<f64>("loops-f64", 0);
+    loops::<f32>("loops-f32", 3);
+}
+
+fn loops<S: Bits>(name: &str, first: usize) {
+    if !exists("gcc") {
+        println!("skipped: there is no gcc");
+        return;
+    }
+    let all: Vec<Interpreted> = catalogue::elements().iter().map(|entry| interpreted(entry.declaration)).collect();
+    let cases = cases::<S>(&all);
+    let chosen: Vec<usize> = (first..all.len()).step_by(5).collect();
+    let elements: Vec<Interpreted> = chosen.iter().map(|&number| all[number].clone()).collect();
+    let renumbered = cases.into_iter().filter_map(|case| {
+        let element = chosen.iter().position(|&number| number == case.element)?;
+        Some(Case { element, ..case })
+    });
+    let folder = folder(name);
+    let records = folder.join("records");
+    std::fs::write(&records, renumbered.flat_map(|case| case.bytes()).collect::<Vec<u8>>()).unwrap();
+    let (real, suffix) = (if S::PRECISION == Precision::Double { "double" } else { "float" }, S::PRECISION.name());
+    let mut text = String::new();
+    let mut names = Vec::new();
+    for file in sources(&elements, Target::C, &[S::PRECISION]).unwrap() {
+        std::fs::write(folder.join(&file.name), &file.text).unwrap();
+        if let Some(name) = file.name.strip_suffix(".c") {
+            text.push_str(&format!("#include \"{}\"\n", file.name));
+            names.extend((!name.ends_with("_lanes")).then(|| name.to_owned()));
+        }
+    }
+    let list = |before: &str, after: &str| {
+        names.iter().map(|name| format!("{before}{name}{after}")).collect::<Vec<_>>().join(", ")
+    };
+    text.push_str(&format!(
+        "#define REAL {real}\n#define ELEMENT energy_{suffix}_element\n#define COLUMN energy_{suffix}_column\n#define BATCH \
+         energy_{suffix}_batch\nstatic const ELEMENT *const elements[] = {{{}}};\ntypedef void loop(int32_t, BATCH \
+         *);\nstatic loop *const plain[] = {{{}}};\nstatic loop *const in_lanes[] = {{{}}};\n",
+        list("&", ""),
+        list("", "_evaluate"),
+        list("", "_evaluate_lanes")
+    ));
+    std::fs::write(folder.join("elements.h"), text).unwrap();
+    let program = folder.join("loops");
+    let driver = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/loops.c");
+    let output = Command::new("gcc")
+        .args(["-std=c99", "-march=native"])
+        .args(OPTIONS)
+        .arg("-I")
+        .arg(&folder)
+        .arg(driver)
+        .arg("-o")
+        .arg(&program)
+        .arg("-lm")
+        .output()
+        .unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let output = Command::new(program).arg(&records).output().unwrap();
+    let printed = String::from_utf8_lossy(&output.stdout);
+    println!("{printed}");
+    assert!(output.status.success() && printed.contains("results compared"), "{printed}");
 }

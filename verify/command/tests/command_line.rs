@@ -396,3 +396,38 @@ fn files_without_declarations_and_files_without_end_are_refused() {
         }
     }
 }
+
+/// Folders for other languages are the same byte for byte, and spare files that are not theirs.
+#[test]
+fn folders_are_written_again_but_never_over_foreign_files() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    std::fs::write(path("s.energy"), "energy Mine(p, q: Point; k: Scalar[N/m]) { k * norm_squared(p - q) }").unwrap();
+    let out = path("out");
+    let emit = |extra: &[&str]| verify(&[&["emit", &path("s.energy"), "Spring", "-o", &out], extra].concat());
+    let first = emit(&["--precision", "both"]);
+    assert!(first.status.success(), "{}", text(&first.stderr));
+    assert!(text(&first.stdout).contains("2 elements in 20 files"), "{}", text(&first.stdout));
+    let header = folder.path().join("out/mine_f32.h");
+    let before = std::fs::read_to_string(&header).unwrap();
+    assert!(before.contains("energy Mine: k * norm_squared(p - q)") && !before.contains("double"), "{before}");
+    assert!(text(&emit(&["--precision", "both"]).stdout).contains(" 0 of them new or changed"));
+    assert_eq!(std::fs::read_to_string(&header).unwrap(), before);
+    // A file that was edited, and one that was never generated.
+    std::fs::write(&header, before.replace("return", "return 1 +")).unwrap();
+    let refused = emit(&["--precision", "f32"]);
+    assert_eq!(refused.status.code(), Some(2));
+    assert!(
+        text(&refused.stderr).contains("mine_f32.h was changed since it was generated"),
+        "{}",
+        text(&refused.stderr)
+    );
+    assert!(emit(&["--precision", "f32", "--force"]).status.success());
+    assert_eq!(std::fs::read_to_string(&header).unwrap(), before);
+    std::fs::write(&header, "int mine;\n").unwrap();
+    let refused = emit(&["--precision", "f32", "--force"]);
+    assert!(text(&refused.stderr).contains("mine_f32.h was not generated"), "{}", text(&refused.stderr));
+    assert_eq!(std::fs::read_to_string(&header).unwrap(), "int mine;\n");
+    let unknown = verify(&["emit", "Spingr", "-o", &out]);
+    assert_eq!(unknown.status.code(), Some(2));
+}

@@ -18,7 +18,9 @@ pub use typed::{Binding, Input, Program, Source, Typed, TypedKind};
 pub use units::unit_exponents;
 
 use crate::budget::{Budget, Phase};
-use crate::diagnostic::Diagnostics;
+use crate::diagnostic::{Diagnostic, Diagnostics};
+use energy_runtime::Kind;
+
 use crate::syntax::{Declaration, Item, UserFunction};
 use constant::Globals;
 use expression::Checker;
@@ -85,6 +87,14 @@ fn check_declaration(
     let budget = &budget.of_declaration(declaration.limits);
     let signature = Signature::of(declaration, globals, diagnostics);
     domain::check(declaration, &signature, diagnostics);
+    let has_vertices = matches!(declaration.kind, Kind::Energy | Kind::Constraint);
+    if declaration.vertices && !has_vertices {
+        let message = format!("a {} has no routines of single vertices", declaration.kind.keyword());
+        diagnostics.push(
+            Diagnostic::new(&declaration.name.span, message)
+                .help("#[vertex] is for energies and constraints; remove it"),
+        );
+    }
     let mut own = Diagnostics::default();
     let checked = declaration.body.as_ref().and_then(|body| {
         let mut checker = Checker::new(&signature, globals, functions, budget, &mut own);
@@ -113,7 +123,7 @@ fn check_declaration(
         audit_scope: declaration.audit_scope.clone(),
         properties: declaration.properties.clone(),
         uncompensated: declaration.uncompensated,
-        vertices: declaration.vertices,
+        vertices: declaration.vertices && has_vertices,
         kind: declaration.kind,
         source: declaration.source.clone(),
         formula: declaration.formula.clone(),

@@ -68,9 +68,8 @@ impl Method {
     /// Returns the type of the returned struct. Its arguments are the number type and those of its arrays; both
     /// Jacobians of a force share theirs.
     fn result_type(&self) -> TokenStream {
-        let has_argument = |field: &&Field| {
-            field.shape != Shape::Number && field.name != "by_velocity" && self.result != "Vertex"
-        };
+        let has_argument =
+            |field: &&Field| field.shape != Shape::Number && field.name != "by_velocity" && self.result != "Vertex";
         let arrays = self.fields.iter().filter(has_argument).map(|field| &field.field_type);
         let (result, number) = (&self.result, quote!(T));
         let arguments = std::iter::once(&number).chain(arrays);

@@ -127,9 +127,10 @@ impl Dialect {
     }
 
     pub(super) fn constant(self, value: f64) -> String {
-        let plain = self.precision.literal(value).unwrap_or_else(|| {
-            format!("energy_{}_from_bits({})", self.precision.name(), self.precision.bits(value))
-        });
+        let plain = self
+            .precision
+            .literal(value)
+            .unwrap_or_else(|| format!("energy_{}_from_bits({})", self.precision.name(), self.precision.bits(value)));
         match self.numbers {
             Numbers::Plain => plain,
             Numbers::Wide => self.call("of", &[&plain]),

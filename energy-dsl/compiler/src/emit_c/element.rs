@@ -230,7 +230,13 @@ impl Element<'_> {
         let _ = writeln!(text, "    {number} all = {};", self.dialect.constant(0.0));
         let _ = writeln!(text, "    {returned} flags = 0U;\n    int32_t term, i;");
         for result in &function.results {
-            let _ = writeln!(text, "    for (i = 0; i < {}; i++) {{\n        {}[i] = {};\n    }}", result.size, result.name, self.dialect.constant(0.0));
+            let _ = writeln!(
+                text,
+                "    for (i = 0; i < {}; i++) {{\n        {}[i] = {};\n    }}",
+                result.size,
+                result.name,
+                self.dialect.constant(0.0)
+            );
         }
         let _ = writeln!(text, "    for (term = 0; term < {terms}; term++) {{");
         let own = format!("stored + {} + {} * term", repetition.shared, repetition.stride);
@@ -249,7 +255,11 @@ impl Element<'_> {
                 true => format!("{name}[i] + term_{name}[i]"),
                 false => self.dialect.call("add", &[&format!("{name}[i]"), &format!("term_{name}[i]")]),
             };
-            let _ = writeln!(text, "        for (i = 0; i < {}; i++) {{\n            {name}[i] = {sum};\n        }}", result.size);
+            let _ = writeln!(
+                text,
+                "        for (i = 0; i < {}; i++) {{\n            {name}[i] = {sum};\n        }}",
+                result.size
+            );
         }
         text.push_str("    }\n");
         for result in &function.results {
@@ -267,7 +277,8 @@ impl Element<'_> {
 
     /// Writes the expansion of the reduced Hessian to points, and the Hessian; nothing without them.
     fn expansion(&self) -> String {
-        let (Some(expansion), Some(reduced)) = (&self.plan.expansion, self.plan.find(RoutineKind::ReducedHessian)) else {
+        let (Some(expansion), Some(reduced)) = (&self.plan.expansion, self.plan.find(RoutineKind::ReducedHessian))
+        else {
             return String::new();
         };
         let (real, is_scalar) = (self.dialect.of_type(false), self.dialect.numbers == Numbers::Plain);
@@ -459,7 +470,9 @@ impl Element<'_> {
         let of_vertex = if vertices.is_empty() { "NULL".to_owned() } else { format!("{name}_vertex") };
         let sizes = RoutineKind::ALL.iter().map(|&kind| {
             let function = functions.iter().find(|function| function.kind == kind);
-            let size = |place: usize| function.and_then(|function| function.results.get(place)).map_or(0, |result| result.size);
+            let size = |place: usize| {
+                function.and_then(|function| function.results.get(place)).map_or(0, |result| result.size)
+            };
             format!("{{{}, {}, {}}}", size(0), size(1), size(2))
         });
         let sizes = sizes.collect::<Vec<_>>().join(", ");
@@ -501,7 +514,14 @@ impl Element<'_> {
     }
 
     /// Says that arguments are not used on purpose.
-    pub(super) fn unused(&self, function: &Function, is_term: bool, used: &[Input], passes_on: bool, text: &mut String) {
+    pub(super) fn unused(
+        &self,
+        function: &Function,
+        is_term: bool,
+        used: &[Input],
+        passes_on: bool,
+        text: &mut String,
+    ) {
         if passes_on {
             return;
         }

@@ -24,7 +24,8 @@ pub(super) struct Meanings(RefCell<FxHashMap<&'static str, Rc<Expression>>>);
 impl Meanings {
     /// Returns the meaning of an operation of the table.
     pub(super) fn of(&self, op: Op) -> Rc<Expression> {
-        let spelling = op.spelling().expect("compiler bug: inputs are read, rules resolved and caution decided elsewhere");
+        let spelling =
+            op.spelling().expect("compiler bug: inputs are read, rules resolved and caution decided elsewhere");
         let mut known = self.0.borrow_mut();
         let parsed = known
             .entry(spelling.meaning)
@@ -110,7 +111,12 @@ impl Expression {
 
 /// Returns the expression of a statement; `None` for an input, which is read in place. `name` returns the name of an
 /// earlier statement.
-pub(super) fn statement(dialect: Dialect, meanings: &Meanings, op: Op, name: impl Fn(NodeId) -> String) -> Option<String> {
+pub(super) fn statement(
+    dialect: Dialect,
+    meanings: &Meanings,
+    op: Op,
+    name: impl Fn(NodeId) -> String,
+) -> Option<String> {
     let call = |function: &str, arguments: &[&str]| Some(dialect.call(function, arguments));
     match op {
         Op::Input(_) => None,

@@ -54,7 +54,8 @@ pub fn sources(
     if let Some(place) = (1..names.len()).find(|&place| names[..place].contains(&names[place])) {
         return Err(SourceError { name: names[place].clone() });
     }
-    let mut files: Vec<SourceFile> = precisions.iter().flat_map(|&of| of_precision(elements, &names, target, of)).collect();
+    let mut files: Vec<SourceFile> =
+        precisions.iter().flat_map(|&of| of_precision(elements, &names, target, of)).collect();
     files.extend(project(&files, target, precisions));
     Ok(files)
 }
@@ -74,12 +75,7 @@ impl std::fmt::Display for SourceError {
 
 impl std::error::Error for SourceError {}
 
-fn of_precision(
-    elements: &[Interpreted],
-    names: &[String],
-    target: Target,
-    precision: Precision,
-) -> Vec<SourceFile> {
+fn of_precision(elements: &[Interpreted], names: &[String], target: Target, precision: Precision) -> Vec<SourceFile> {
     let suffix = precision.name();
     let shared = |part: &str, about: &str, text: String| {
         folder::stamped(&format!("energy_{suffix}{part}.h"), &[about.to_owned()], &text)
@@ -98,7 +94,8 @@ fn of_precision(
         let about = [format!("{} {}: {}", declaration.kind.keyword(), declaration.name, declaration.formula)];
         let written =
             Element { plan: element.plan(), inputs: element.inputs(), name: &name, dialect, meanings: &meanings };
-        let mut add = |ending: &str, text: String| files.push(folder::stamped(&format!("{name}{ending}"), &about, &text));
+        let mut add =
+            |ending: &str, text: String| files.push(folder::stamped(&format!("{name}{ending}"), &about, &text));
         add(".h", header(&written));
         let text = format!("#include \"{name}.h\"\n\n{}{}", written.description(), written.loops(false));
         add(&format!(".{source}"), text);

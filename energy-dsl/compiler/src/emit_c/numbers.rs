@@ -14,7 +14,19 @@ pub(super) fn header(precision: Precision) -> String {
     };
     let functions = functions(Dialect { precision, numbers: Numbers::Plain, operators: false });
     let interpreter = super::tape::interpreter(precision);
-    let parts = [include_str!("numbers.h"), "\n", huge, include_str!("huge.h"), &functions, "\n", include_str!("wide.h"), "\n", &interpreter, "\n", include_str!("project.h")];
+    let parts = [
+        include_str!("numbers.h"),
+        "\n",
+        huge,
+        include_str!("huge.h"),
+        &functions,
+        "\n",
+        include_str!("wide.h"),
+        "\n",
+        &interpreter,
+        "\n",
+        include_str!("project.h"),
+    ];
     let includes = "#include <float.h>\n#include <math.h>\n#include <stddef.h>\n#include <stdint.h>\n#include \
                     <string.h>\n\n";
     guarded(precision, "", includes, &parts)
@@ -57,7 +69,8 @@ fn routines() -> String {
 fn function(dialect: Dialect, trace: &Trace) -> String {
     let number = dialect.of_type(false);
     let arguments = ["a", "b"][..trace.arguments].iter().map(|name| format!("{number} {name}")).collect::<Vec<_>>();
-    let mut text = format!("\nENERGY_ROUTINE {number} {}{}({}) {{\n", dialect.prefix(), trace.name, arguments.join(", "));
+    let mut text =
+        format!("\nENERGY_ROUTINE {number} {}{}({}) {{\n", dialect.prefix(), trace.name, arguments.join(", "));
     let mut names: Vec<String> = Vec::with_capacity(trace.steps.len());
     for (place, step) in trace.steps.iter().enumerate() {
         names.push(match step {

@@ -36,7 +36,8 @@ pub(super) fn interpreter(precision: Precision) -> String {
     for (operation, list, meaning, section) in ROWS {
         let names = names(list);
         let (is_mask, of_masks) = (matches!(*section, "comparisons" | "connectives"), *section == "connectives");
-        let reads: Vec<String> = (0..names.len()).map(|number| place(if of_masks { "m" } else { "n" }, number)).collect();
+        let reads: Vec<String> =
+            (0..names.len()).map(|number| place(if of_masks { "m" } else { "n" }, number)).collect();
         let reads: Vec<&str> = reads.iter().map(String::as_str).collect();
         let mut value = String::new();
         Expression::of_text(meaning, &names).written(dialect, &reads, &mut value);
@@ -112,11 +113,8 @@ impl Element<'_> {
             let _ = writeln!(text, "    m[{place}] = {};", u8::from(*truth));
         }
         let _ = writeln!(text, "    {};", self.dialect.call("run_tape", &["code", &code.len().to_string(), "n", "m"]));
-        let _ = writeln!(
-            text,
-            "    for (i = 0; i < {}; i++) {{\n        found[i] = n[results[i]];\n    }}",
-            results.len()
-        );
+        let _ =
+            writeln!(text, "    for (i = 0; i < {}; i++) {{\n        found[i] = n[results[i]];\n    }}", results.len());
         let [degenerate, kink] = recorded.flags;
         let [outside, definite] = recorded.settled;
         for (mask, bit) in [(outside, 1), (definite, 2), (degenerate, 4), (kink, 4)] {

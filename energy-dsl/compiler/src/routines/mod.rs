@@ -337,13 +337,7 @@ pub struct Vertices {
 }
 
 impl Vertices {
-    fn new(
-        graph: &Graph,
-        value: NodeId,
-        coordinates: &Coordinates,
-        points: usize,
-        routes: &mut Vec<Routes>,
-    ) -> Self {
+    fn new(graph: &Graph, value: NodeId, coordinates: &Coordinates, points: usize, routes: &mut Vec<Routes>) -> Self {
         let mut graph = graph.clone();
         let list = vertices(&mut graph, value, coordinates, points, routes);
         let list = list.into_iter().map(|whole| whole.split(&mut graph)).collect();

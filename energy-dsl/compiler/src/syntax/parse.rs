@@ -254,8 +254,7 @@ impl<'a> Parser<'a> {
             }
         }
         let visibility = tokens::text(&self.tokens[visibility_start..self.at]);
-        let claims =
-            audit_samples.is_some() || uncompensated || vertices || limits.is_some() || !properties.is_empty();
+        let claims = audit_samples.is_some() || uncompensated || vertices || limits.is_some() || !properties.is_empty();
         if claims && (self.is_word("fn") || self.is_word("const")) {
             return self.fail("a declaration after its attributes (functions and constants have only documentation)");
         }

@@ -309,11 +309,7 @@ impl<S: Format> Bits for Traced<S> {
     }
     fn reduced_if_huge(self, huge: TracedMask, [quadrant, high, low]: [Self; 3]) -> [Self; 3] {
         let part = |name, ordinary: Self| Self::of(name, &[huge.0, self.0, ordinary.0]);
-        [
-            part("quadrant_if_huge", quadrant),
-            part("high_remainder_if_huge", high),
-            part("low_remainder_if_huge", low),
-        ]
+        [part("quadrant_if_huge", quadrant), part("high_remainder_if_huge", high), part("low_remainder_if_huge", low)]
     }
 }
 

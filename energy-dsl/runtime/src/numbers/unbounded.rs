@@ -369,10 +369,7 @@ impl<const INPUTS: usize, const OUTPUTS: usize> Precautions<INPUTS, OUTPUTS> {
     /// Creates the table of a routine.
     #[must_use]
     pub const fn of<W: WithCare<INPUTS, OUTPUTS>>() -> Self {
-        Self {
-            double: GeneralPath::of::<W, INPUTS, OUTPUTS>(),
-            ray: on_slices::<W, Ray, INPUTS, OUTPUTS>,
-        }
+        Self { double: GeneralPath::of::<W, INPUTS, OUTPUTS>(), ray: on_slices::<W, Ray, INPUTS, OUTPUTS> }
     }
 }
 

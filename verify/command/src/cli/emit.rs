@@ -70,7 +70,11 @@ impl Emit {
         let files = sources(&elements, target, precisions)?;
         let written = write(&self.output, &files, self.force)?;
         let folder = self.output.display();
-        print(&format!("{} elements in {} files in {folder}, {written} of them new or changed\n", elements.len(), files.len()))?;
+        print(&format!(
+            "{} elements in {} files in {folder}, {written} of them new or changed\n",
+            elements.len(),
+            files.len()
+        ))?;
         Ok(true)
     }
 }
@@ -108,7 +112,8 @@ fn write(folder: &Path, files: &[SourceFile], force: bool) -> anyhow::Result<usi
             Ok((Origin::Generated, false)) => changed.push(file),
             Ok((Origin::Changed, false)) if force => changed.push(file),
             Ok((Origin::Changed, false)) => {
-                let _ = writeln!(problems, "  {} was changed since it was generated (--force overwrites it)", file.name);
+                let _ =
+                    writeln!(problems, "  {} was changed since it was generated (--force overwrites it)", file.name);
             }
             Ok((Origin::Foreign, false)) | Err(_) => {
                 let _ = writeln!(problems, "  {} was not generated; move it, or choose another folder", file.name);
