@@ -1,0 +1,99 @@
+//! Renders plans as a Python module for Warp: native functions around the text of C, with adjoints.
+
+mod function;
+mod signature;
+
+use std::fmt::Write as _;
+
+use super::dialect::{Dialect, Numbers, Precision};
+use super::element::Element;
+use super::expression::Meanings;
+use super::{SourceFile, folder, numbers};
+use crate::interpreted::Interpreted;
+use energy_runtime::RoutineKind;
+
+/// Renders elements as one module.
+pub(super) fn module(elements: &[Interpreted], names: &[String], precisions: &[Precision]) -> SourceFile {
+    let meanings = Meanings::default();
+    let mut text = include_str!("module.py.in").to_owned();
+    let (mut table, mut code) = (String::new(), String::new());
+    for &precision in precisions {
+        let _ = writeln!(code, "\n_{} = r\"\"\"{}\"\"\"", precision.name().to_uppercase(), raw(&numbers::bare(precision)));
+        for (element, name) in elements.iter().zip(names) {
+            let name = format!("{name}_{}", precision.name());
+            let dialect = Dialect { precision, numbers: Numbers::Plain, operators: false };
+            let written =
+                Element { plan: element.plan(), inputs: element.inputs(), name: &name, dialect, meanings: &meanings };
+            table.push_str(&row(&written));
+            code.push_str(&texts(&written));
+            code.push_str(&function::functions(&written));
+        }
+    }
+    let _ = writeln!(text, "\n#: What each element is: its declaration, and the numbers of its inputs.\nELEMENTS = {{\n{table}}}");
+    text.push_str(&code);
+    folder::stamped("energies.py", &["Energies for kernels of Warp; ELEMENTS lists their formulas.".to_owned()], &text)
+}
+
+/// Returns the entry of an element in the table of elements.
+fn row(element: &Element<'_>) -> String {
+    let plan = element.plan;
+    format!(
+        "    \"{}\": {{\n        \"declaration\": \"{}\",\n        \"formula\": \"{}\",\n        \"coordinates\": {},\n        \
+         \"parameters\": {},\n        \"rest\": {},\n        \"stored\": {},\n    }},\n",
+        element.name,
+        plan.declaration.name,
+        quoted(&plan.declaration.formula),
+        plan.coordinates,
+        plan.parameters,
+        plan.shape,
+        plan.stored()
+    )
+}
+
+/// Returns the name of the constant that has the C text of a routine.
+fn constant(element: &Element<'_>, kind: RoutineKind) -> String {
+    format!("_{}_{}", element.name, kind.name()).to_uppercase()
+}
+
+/// Returns the routines of an element: those of its plan, and the Hessian, which may be an expansion.
+fn kinds(element: &Element<'_>) -> Vec<RoutineKind> {
+    element.functions().iter().map(|function| function.kind).collect()
+}
+
+/// Writes the C text of all routines as constants.
+fn texts(element: &Element<'_>) -> String {
+    let mut text = String::new();
+    for kind in kinds(element).into_iter().filter(|kind| *kind != RoutineKind::ReducedHessian) {
+        let _ = writeln!(text, "\n{} = r\"\"\"\n{}\"\"\"", constant(element, kind), raw(&element.alone(kind)));
+    }
+    text
+}
+
+/// Returns a text that can stand in a string of Python.
+fn quoted(text: &str) -> String {
+    text.replace('\\', "\\\\").replace('"', "\\\"").replace('\n', "\\n")
+}
+
+/// Returns a text that can stand in a raw string of Python.
+fn raw(text: &str) -> String {
+    text.replace("\"\"\"", "'''")
+}
+
+impl Element<'_> {
+    /// Writes a routine, and the routines that it calls, for a function that needs no others.
+    fn alone(&self, kind: RoutineKind) -> String {
+        let is_repeated = self.plan.repetition.is_some();
+        let of_moving = |kind: RoutineKind| {
+            let routine = self.plan.find(kind).expect("compiler bug: routines of the element are written");
+            let sum = if is_repeated { self.sum(routine) } else { String::new() };
+            self.routine(routine, is_repeated) + &sum
+        };
+        match kind {
+            RoutineKind::Rest => self.routine(&self.plan.rest, false),
+            RoutineKind::Hessian if self.plan.find(kind).is_none() => {
+                of_moving(RoutineKind::ReducedHessian) + &self.expansion()
+            }
+            _ => of_moving(kind),
+        }
+    }
+}
