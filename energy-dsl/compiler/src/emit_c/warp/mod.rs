@@ -1,5 +1,6 @@
 //! Renders plans as a Python module for Warp: native functions around the text of C, with adjoints.
 
+mod adjoint;
 mod function;
 mod signature;
 
@@ -18,7 +19,8 @@ pub(super) fn module(elements: &[Interpreted], names: &[String], precisions: &[P
     let mut text = include_str!("module.py.in").to_owned();
     let (mut table, mut code) = (String::new(), String::new());
     for &precision in precisions {
-        let _ = writeln!(code, "\n_{} = r\"\"\"{}\"\"\"", precision.name().to_uppercase(), raw(&numbers::bare(precision)));
+        let _ =
+            writeln!(code, "\n_{} = r\"\"\"{}\"\"\"", precision.name().to_uppercase(), raw(&numbers::bare(precision)));
         for (element, name) in elements.iter().zip(names) {
             let name = format!("{name}_{}", precision.name());
             let dialect = Dialect { precision, numbers: Numbers::Plain, operators: false };
@@ -29,7 +31,10 @@ pub(super) fn module(elements: &[Interpreted], names: &[String], precisions: &[P
             code.push_str(&function::functions(&written));
         }
     }
-    let _ = writeln!(text, "\n#: What each element is: its declaration, and the numbers of its inputs.\nELEMENTS = {{\n{table}}}");
+    let _ = writeln!(
+        text,
+        "\n#: What each element is: its declaration, and the numbers of its inputs.\nELEMENTS = {{\n{table}}}"
+    );
     text.push_str(&code);
     folder::stamped("energies.py", &["Energies for kernels of Warp; ELEMENTS lists their formulas.".to_owned()], &text)
 }
@@ -95,5 +100,54 @@ impl Element<'_> {
             }
             _ => of_moving(kind),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::{Budget, Interpreted, Origin, Precision, Target, origin, sources};
+
+    fn module(text: &str) -> String {
+        let elements = Interpreted::from_file_with_vertices(text, "text", &Budget::default()).expect("it compiles");
+        let files = sources(&elements, Target::Warp, &[Precision::Double, Precision::Single]).expect("names differ");
+        assert_eq!(files.iter().map(|file| &*file.name).collect::<Vec<_>>(), ["energies.py"]);
+        files[0].text.clone()
+    }
+
+    #[test]
+    fn modules_know_whether_they_were_changed() {
+        let text: String = (0..60).map(|i| format!("energy Weight{i}(p: Point; w: Scalar) {{ w * p.z }}\n")).collect();
+        let text = module(&text);
+        assert_eq!(origin(&text), Origin::Generated);
+        assert_eq!(origin(&text.replace("weight7_f64", "weight8_f64")), Origin::Changed);
+    }
+
+    #[test]
+    fn every_kind_has_its_functions() {
+        let text = "energy Spring(p, q: Point; rest X, Y: Point; k: Scalar) { k * (norm(p - q) - norm(X - Y))^2 }
+            force Drag(p: Point, v: Velocity; c: Scalar) { -c * v }
+            constraint Middle(p, q, m: Point) { (p + q) / 2 - m }
+            residual Circle(a, b: Scalar; r: Scalar) { [a^2 + b^2 - r^2] }";
+        let text = module(text);
+        let energy = ["rest", "value", "gradient", "hessian", "hessian_vector", "vertex", "flags"];
+        let constraint = ["constraint", "constraint_jacobian", "constraint_hessian", "gauss_newton", "value", "force"];
+        let all = [
+            ("spring", &energy[..]),
+            ("drag", &["force", "jacobians", "flags"]),
+            ("middle", &constraint),
+            ("circle", &["residual", "jacobian", "flags"]),
+        ];
+        for (element, functions) in all {
+            for function in functions {
+                for suffix in ["f64", "f32"] {
+                    assert!(text.contains(&format!("\ndef {element}_{suffix}_{function}(\n")), "{element} {function}");
+                }
+            }
+        }
+        // What hosts need in C, and what Warp cannot read inside of a function, is left out.
+        assert!(!text.contains("_element") && !text.contains("#include") && text.contains("energy_f64_run_tape"));
+        let (_, single) = text.split_once("_F32 = ").expect("it is in single precision, too");
+        let code = single.lines().filter(|line| line.contains("energy_") && !line.trim_start().starts_with("/*"));
+        assert!(code.clone().count() > 100 && code.clone().all(|line| !line.contains("double ")));
     }
 }

@@ -7,17 +7,13 @@ use crate::interpreted::{InputKind, InputNumbers};
 use crate::syntax::canonical;
 
 /// Words that Python, C++, Warp or the generated code use.
-const RESERVED: &[&str] = &[
-    "alignas", "alignof", "and", "and_eq", "as", "asm", "assert", "async", "auto", "await", "bitand", "bitor", "blocks",
-    "bool", "break", "by_position", "by_velocity", "case", "catch", "char", "class", "compl", "const", "constexpr",
-    "continue", "decltype", "def", "default", "del", "delete", "do", "double", "elif", "else", "enum", "except",
-    "explicit", "export", "extern", "finally", "float", "for", "force", "friend", "from", "global", "goto", "gradient", "hessians",
-    "if", "import", "in", "inline", "int", "is", "jacobian", "lambda", "long", "mutable", "namespace", "new", "noexcept",
-    "nonlocal", "not", "not_eq", "nullptr", "operator", "or", "or_eq", "pass", "point", "private", "protected", "public",
-    "raise", "register", "result", "ret", "return", "short", "signed", "sizeof", "static", "stored", "struct", "switch",
-    "template", "this", "throw", "true", "try", "typedef", "typeid", "typename", "union", "unsigned", "using", "value",
-    "virtual", "void", "volatile", "while", "with", "wp", "xor", "xor_eq", "yield",
-];
+const RESERVED: &str = "alignas alignof and and_eq as asm assert async auto await bitand bitor blocks bool break by_position by_velocity \
+    case catch char class compl const constexpr continue decltype def default del delete do double elif else enum \
+    except explicit export extern finally float for force friend from global goto gradient hessians if import in \
+    inline int is jacobian lambda long mutable namespace new noexcept nonlocal not not_eq nullptr operator or or_eq \
+    pass point private protected public raise register result ret return short signed sizeof static stored struct \
+    switch template this throw true try typedef typeid typename union unsigned using value virtual void volatile \
+    while with wp xor xor_eq yield";
 
 /// The type of an argument or a result.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -110,7 +106,12 @@ impl Argument {
 }
 
 /// The arguments that are the inputs of some kinds; those with another array get `prefix` before their names.
-pub(super) fn arguments(inputs: &[InputNumbers], kinds: &[InputKind], array: &'static str, prefix: &str) -> Vec<Argument> {
+pub(super) fn arguments(
+    inputs: &[InputNumbers],
+    kinds: &[InputKind],
+    array: &'static str,
+    prefix: &str,
+) -> Vec<Argument> {
     let mut all: Vec<(InputKind, String, Type, String)> = Vec::new();
     for input in inputs {
         let unit = if input.unit.is_empty() { String::new() } else { format!(" in {}", input.unit) };
@@ -154,7 +155,10 @@ fn identifier(name: &str) -> String {
             }
         }
     }
-    if RESERVED.contains(&&*plain) || plain.starts_with(|c: char| c.is_ascii_digit()) || plain.starts_with("v_") {
+    if RESERVED.split_whitespace().any(|word| word == plain)
+        || plain.starts_with(|c: char| c.is_ascii_digit())
+        || plain.starts_with("v_")
+    {
         plain.push('_');
     }
     plain
