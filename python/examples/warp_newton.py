@@ -28,8 +28,16 @@ def weights(x: wp.array[wp.vec3d], mass: wp.array[wp.float64], pinned: wp.array[
 
 
 @wp.kernel
-def triangles(tris: wp.array2d[int], x: wp.array[wp.vec3d], stored: wp.array2d[wp.float64], pinned: wp.array[wp.float64],
-              g: wp.array[wp.vec3d], own: wp.array2d[wp.vec3d], blocks: wp.array2d[wp.mat33d], flags: wp.array[int]):  # fmt: skip
+def triangles(
+    tris: wp.array2d[int],
+    x: wp.array[wp.vec3d],
+    stored: wp.array2d[wp.float64],
+    pinned: wp.array[wp.float64],
+    g: wp.array[wp.vec3d],
+    own: wp.array2d[wp.vec3d],
+    blocks: wp.array2d[wp.mat33d],
+    flags: wp.array[int],
+):
     i = wp.tid()
     x0, x1, x2 = x[tris[i, 0]], x[tris[i, 1]], x[tris[i, 2]]
     flags[i] = energies.st_vk_f64_hessian(x0, x1, x2, LAMBDA, MU, stored[i], own[i], blocks[i])
@@ -57,7 +65,8 @@ def solve():
     n, count = len(X), len(tris)
     elements, m = wp.array(tris, dtype=int), wp.array(mass, dtype=wp.float64)
     pinned = wp.array(X[:, 1] == SIDE, dtype=wp.float64)
-    stored, flags = wp.zeros((count, energies.ELEMENTS["st_vk_f64"]["stored"]), dtype=wp.float64), wp.zeros(count, dtype=int)
+    stored = wp.zeros((count, energies.ELEMENTS["st_vk_f64"]["stored"]), dtype=wp.float64)
+    flags = wp.zeros(count, dtype=int)
     wp.launch(at_rest, count, inputs=[elements, wp.array(X, dtype=wp.vec2d), stored, flags])
     x = wp.array(np.insert(X, 1, 0.0, axis=1), dtype=wp.vec3d)  # in the plane y = 0
     g, step, own = wp.zeros_like(x), wp.zeros_like(x), wp.zeros((count, 3), dtype=wp.vec3d)

@@ -1,4 +1,4 @@
-//! Generated functions for Warp have the bits of the tape on Warp's CPU, and their adjoints are the generated derivatives.
+//! Generated functions for Warp have the bits of the tape on Warp's CPU; their adjoints are the generated derivatives.
 //!
 //! Needs a Python that imports `warp`: `python3`, or the one that WARP_PYTHON names. Tests are skipped without one.
 

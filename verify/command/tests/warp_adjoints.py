@@ -65,7 +65,9 @@ def st_vk_product(
 
 
 @wp.kernel
-def st_vk_vertex(x: wp.array2d(dtype=vec), mu: wp.array(dtype=real), stored: wp.array2d(dtype=real), g: wp.array2d(dtype=vec)):
+def st_vk_vertex(
+    x: wp.array2d(dtype=vec), mu: wp.array(dtype=real), stored: wp.array2d(dtype=real), g: wp.array2d(dtype=vec)
+):
     i = wp.tid()
     for j in range(3):
         found = e.st_vk_f64_vertex(j, x[i, 0], x[i, 1], x[i, 2], real(3.0), mu[i], stored[i])

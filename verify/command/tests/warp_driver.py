@@ -1,7 +1,7 @@
 """Runs all functions of the generated module on the inputs in a folder.
 
-NAME.inputs has a row for each input: points, velocities, parameters, rest shape. Results go to FUNCTION.numbers, flags to
-FUNCTION.flags.
+NAME.inputs has a row for each input: points, velocities, parameters, rest shape. Results go to FUNCTION.numbers, flags
+to FUNCTION.flags.
 """
 
 import re
@@ -57,7 +57,8 @@ class Job:
         arguments = "".join(f"{name}: wp.array2d(dtype={of_type}), " for name, of_type in arrays.items())
         return (
             f"@wp.kernel(enable_backward=False)\ndef k_{self.name}({arguments}"
-            f"returned: wp.array(dtype=T{number_of(self.returned)})):\n    i = wp.tid()\n    returned[i] = {self.call}\n\n\n"
+            f"returned: wp.array(dtype=T{number_of(self.returned)})):\n"
+            f"    i = wp.tid()\n    returned[i] = {self.call}\n\n\n"
         )
 
     def run(self, kernel, rows, kept):
@@ -110,7 +111,8 @@ wp.set_device("cpu")
 all_jobs = list(jobs())
 text = "".join(job.kernel() for job in all_jobs)
 types = "".join(f"T{number} = TYPES[{number}]\n" for number in range(len(TYPES)))
-(FOLDER / "kernels.py").write_text(f"import warp as wp\n\nimport energies\nfrom __main__ import TYPES\n\n{types}\n\n{text}")
+head = "import warp as wp\n\nimport energies\nfrom __main__ import TYPES\n\n"
+(FOLDER / "kernels.py").write_text(f"{head}{types}\n\n{text}")
 import kernels  # noqa: E402
 
 stored = {}

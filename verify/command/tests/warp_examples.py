@@ -55,7 +55,8 @@ def by_hand(tris, X, mass, pinned, mu, lam, g):
 newton = runpy.run_path(str(EXAMPLES / "warp_newton.py"))
 found = newton["solve"]()
 tris, X, mass = newton["sheet"]()
-truth = by_hand(tris, X, mass, X[:, 1] == newton["SIDE"], float(newton["MU"]), float(newton["LAMBDA"]), np.array(newton["G"]))
+mu, lam, g = float(newton["MU"]), float(newton["LAMBDA"]), np.array(newton["G"])
+truth = by_hand(tris, X, mass, X[:, 1] == newton["SIDE"], mu, lam, g)
 error = np.abs(found - truth).max() / newton["SIDE"]
 assert error < 1e-12, error
 # The sheet did stretch, so the solutions agree about something.

@@ -9,12 +9,10 @@ impl Element<'_> {
     /// Reads the adjoint of the returned value into an array.
     pub(super) fn read_adjoint(&self, of_type: Type) -> String {
         let real = self.dialect.precision.real();
+        let (size, number) = (of_type.size(), of_type.number("adj_ret"));
         format!(
-            "{real} energy_adjoint[{}];\nint energy_is_asked = 0;\nfor (int i = 0; i < {}; i++) {{\n    energy_adjoint[i] = \
-             {};\n    energy_is_asked |= energy_adjoint[i] != 0;\n}}\n",
-            of_type.size(),
-            of_type.size(),
-            of_type.number("adj_ret")
+            "{real} energy_adjoint[{size}];\nint energy_is_asked = 0;\nfor (int i = 0; i < {size}; i++) {{\n    \
+             energy_adjoint[i] = {number};\n    energy_is_asked |= energy_adjoint[i] != 0;\n}}\n"
         )
     }
 

@@ -212,7 +212,7 @@ impl Element<'_> {
         body.push_str(&self.returned(of_type, "energy_found"));
         let mut arguments = vec![("point".to_owned(), "wp.int32".to_owned(), "number of the point, from 0".to_owned())];
         arguments.extend(self.declared(&inputs, true));
-        let docs = "Returns the derivatives of U by one point: the gradient in row 0, the 3x3 block in rows 1 to 3. The \
+        let docs = "Returns the derivatives of U by one point: the gradient in row 0, the block in rows 1 to 3. The \
                     adjoint is not known.";
         let adjoint = Code { routines: Vec::new(), body: self.read_adjoint(of_type) + &self.unknown(&inputs) };
         Native {
@@ -250,7 +250,7 @@ impl Element<'_> {
             let (annotation, docs) = (of_type.annotation(self.dialect.precision), format!("array of {count}: {docs}"));
             arguments.push((name.to_owned(), format!("wp.array(dtype={annotation})"), docs));
             let _ = match is_triangle {
-                true => writeln!(body, "{}", expanded(points)),
+                true => writeln!(body, "{}", EXPANDED.replace("POINTS", &points.to_string())),
                 false => writeln!(
                     body,
                     "for (int i = 0; i < {}; i++) {{ wp::index({name}, {number} = energy_{}[i]; }}",
@@ -304,14 +304,15 @@ impl Element<'_> {
 }
 
 /// Writes the triangle of blocks of a symmetric matrix as all blocks.
-fn expanded(points: usize) -> String {
-    format!(
-        "for (int i = 0; i < {points}; i++) {{\n    for (int j = i; j < {points}; j++) {{\n        for (int k = 0; k < 9; k++) \
-         {{\n            const auto energy_number = energy_hessian[9 * (i * {points} - i * (i + 1) / 2 + j) + k];\n            \
-         wp::index(blocks, i * {points} + j).data[k / 3][k % 3] = energy_number;\n            wp::index(blocks, j * {points} + \
-         i).data[k % 3][k / 3] = energy_number;\n        }}\n    }}\n}}"
-    )
-}
+const EXPANDED: &str = r"for (int i = 0; i < POINTS; i++) {
+    for (int j = i; j < POINTS; j++) {
+        for (int k = 0; k < 9; k++) {
+            const auto energy_number = energy_hessian[9 * (i * POINTS - i * (i + 1) / 2 + j) + k];
+            wp::index(blocks, i * POINTS + j).data[k / 3][k % 3] = energy_number;
+            wp::index(blocks, j * POINTS + i).data[k % 3][k / 3] = energy_number;
+        }
+    }
+}";
 
 /// Returns a text that can stand in a docstring.
 fn escaped(text: &str) -> String {

@@ -7,7 +7,8 @@ use crate::interpreted::{InputKind, InputNumbers};
 use crate::syntax::canonical;
 
 /// Words that Python, C++, Warp or the generated code use.
-const RESERVED: &str = "alignas alignof and and_eq as asm assert async auto await bitand bitor blocks bool break by_position by_velocity \
+const RESERVED: &str = "alignas alignof and and_eq as asm assert async auto await bitand bitor blocks bool break \
+    by_position by_velocity \
     case catch char class compl const constexpr continue decltype def default del delete do double elif else enum \
     except explicit export extern finally float for force friend from global goto gradient hessians if import in \
     inline int is jacobian lambda long mutable namespace new noexcept nonlocal not not_eq nullptr operator or or_eq \
