@@ -116,7 +116,8 @@ impl<S: Bits> Case<S> {
         let numbers = |list: &[f64]| list.iter().map(|&x| S::of(x)).collect::<Vec<S>>();
         let mut velocities = numbers(&sample.velocities);
         velocities.resize(of.coordinates(), S::of(0.0));
-        let [parameters, rest, positions] = [&sample.parameters, &sample.rest, &sample.positions].map(|list| numbers(list));
+        let [parameters, rest, positions] =
+            [&sample.parameters, &sample.rest, &sample.positions].map(|list| numbers(list));
         Self { parameters, rest, positions, velocities }
     }
 
@@ -170,8 +171,19 @@ fn expected<S: Copy>(routine: &str, groups: &[Vec<S>], points: usize) -> Vec<S> 
 }
 
 const ROUTINES: [&str; 13] = [
-    "value", "gradient", "hessian_vector", "hessian", "force", "jacobians", "residual", "jacobian", "vertex_0", "vertex_1",
-    "vertex_2", "vertex_3", "gauss_newton",
+    "value",
+    "gradient",
+    "hessian_vector",
+    "hessian",
+    "force",
+    "jacobians",
+    "residual",
+    "jacobian",
+    "vertex_0",
+    "vertex_1",
+    "vertex_2",
+    "vertex_3",
+    "gauss_newton",
 ];
 
 /// Compares an element with the tape. Returns the numbers of results that were compared, and of those left to rays.
@@ -225,7 +237,8 @@ fn check<S: Bits>(name: &str) {
     let names: Vec<String> = names.map(str::to_owned).collect();
     assert_eq!(names.len(), elements.len());
     for (name, cases) in names.iter().zip(&all) {
-        std::fs::write(folder.join(format!("{name}.inputs")), cases.iter().flat_map(Case::bytes).collect::<Vec<u8>>()).unwrap();
+        std::fs::write(folder.join(format!("{name}.inputs")), cases.iter().flat_map(Case::bytes).collect::<Vec<u8>>())
+            .unwrap();
     }
     println!("{}", run(&python, &script("warp_driver.py"), &folder));
     let mut total = (0, 0);

@@ -124,8 +124,11 @@ mod tests {
 
     #[test]
     fn every_kind_has_its_functions() {
-        let text = "energy Spring(p, q: Point; rest X, Y: Point; k: Scalar) { k * (norm(p - q) - norm(X - Y))^2 }
-            force Drag(p: Point, v: Velocity; c: Scalar) { -c * v }
+        let text = "energy Spring(p, q: Point; rest X, Y: Vec3; k: Scalar) {
+                rest { let L = norm(X - Y); }
+                k * (norm(p - q) - L)^2
+            }
+            force Drag(_p: Point, v: Velocity; c: Scalar) { -c * v }
             constraint Middle(p, q, m: Point) { (p + q) / 2 - m }
             residual Circle(a, b: Scalar; r: Scalar) { [a^2 + b^2 - r^2] }";
         let text = module(text);
