@@ -10,3 +10,4 @@ mod fusion_reference;
 mod multiprecision;
 mod tape;
 mod tracked_skirt;
+mod warp;

@@ -185,7 +185,7 @@ struct Counts {
 /// Compares with routines of the tape. `plain` elements lack those of single vertices, which must not change the others.
 fn compare<S: Bits>(elements: &[Interpreted], plain: &[Interpreted], cases: &[Case<S>], mut found: &[u8]) -> Counts {
     let mut counts = Counts::default();
-    let mut flags = |found: &mut &[u8]| {
+    let flags = |found: &mut &[u8]| {
         let (flags, rest) = found.split_first_chunk().expect("the program writes all flags");
         *found = rest;
         u32::from_le_bytes(*flags)

@@ -146,7 +146,7 @@ impl Element<'_> {
     }
 
     /// Writes a routine: its general path, and the function itself. One term of a sum gets its own numbers.
-    fn routine(&self, routine: &RoutinePlan, is_term: bool) -> String {
+    pub(super) fn routine(&self, routine: &RoutinePlan, is_term: bool) -> String {
         let function = self.function(routine.kind, &routine.sizes());
         let name = if is_term { format!("term_{}", function.name) } else { function.name.clone() };
         let mut text = String::new();
@@ -200,7 +200,7 @@ impl Element<'_> {
     }
 
     /// Writes the sum of a routine over all terms.
-    fn sum(&self, routine: &RoutinePlan) -> String {
+    pub(super) fn sum(&self, routine: &RoutinePlan) -> String {
         let repetition = self.plan.repetition.as_ref().expect("compiler bug: a sum has terms");
         let function = self.function(routine.kind, &routine.sizes());
         let (real, terms) = (self.dialect.precision.real(), repetition.terms());
@@ -222,7 +222,7 @@ impl Element<'_> {
         if constants > 0 {
             let _ = writeln!(text, "    static const {real} table[{terms}][{constants}] = {{{}}};", rows.join(", "));
         } else {
-            let _ = writeln!(text, "    static const {real} table[{terms}][1];");
+            let _ = writeln!(text, "    static const {real} table[{terms}][1] = {{{{0}}}};");
         }
         for result in &function.results {
             let _ = writeln!(text, "    {number} term_{}[{}];", result.name, result.size);
@@ -276,7 +276,7 @@ impl Element<'_> {
     }
 
     /// Writes the expansion of the reduced Hessian to points, and the Hessian; nothing without them.
-    fn expansion(&self) -> String {
+    pub(super) fn expansion(&self) -> String {
         let (Some(expansion), Some(reduced)) = (&self.plan.expansion, self.plan.find(RoutineKind::ReducedHessian))
         else {
             return String::new();

@@ -1,4 +1,5 @@
-//! Renders plans as C, and as CUDA, which is the same text with intrinsics in place of operators.
+//! Renders plans as C, as CUDA, which is the same text with intrinsics in place of operators, and as functions of Warp,
+//! which have that text inside.
 //!
 //! Numbers have the bits of scalars of generated Rust at the SIMD levels with fused operations. The general path runs over
 //! numbers with an extended exponent. What only limits along rays can decide is flagged.
@@ -9,6 +10,7 @@ mod expression;
 mod folder;
 mod numbers;
 mod tape;
+mod warp;
 
 use std::fmt::Write as _;
 
@@ -29,6 +31,8 @@ pub enum Target {
     Cpp,
     /// CUDA C++, which also runs on the host.
     Cuda,
+    /// A Python module of functions for kernels of Warp, on the CPU and on CUDA.
+    Warp,
 }
 
 /// A generated file.
@@ -41,7 +45,7 @@ pub struct SourceFile {
 }
 
 /// Renders elements as a folder that needs nothing else: headers, loops over elements, a `README.md` and a
-/// `CMakeLists.txt`. Equal elements give equal bytes.
+/// `CMakeLists.txt`; for Warp, one Python module. Equal elements give equal bytes.
 ///
 /// # Errors
 /// When two elements have one name in C.
@@ -53,6 +57,9 @@ pub fn sources(
     let names: Vec<String> = elements.iter().map(|element| snake_case(&element.declaration().name)).collect();
     if let Some(place) = (1..names.len()).find(|&place| names[..place].contains(&names[place])) {
         return Err(SourceError { name: names[place].clone() });
+    }
+    if target == Target::Warp {
+        return Ok(vec![warp::module(elements, &names, precisions)]);
     }
     let mut files: Vec<SourceFile> =
         precisions.iter().flat_map(|&of| of_precision(elements, &names, target, of)).collect();
@@ -115,7 +122,7 @@ fn project(files: &[SourceFile], target: Target, precisions: &[Precision]) -> [S
     let sources: Vec<String> =
         files.iter().filter(|file| is_source(&file.name)).map(|file| format!("  {}", file.name)).collect();
     let language = match target {
-        Target::C => "C",
+        Target::C | Target::Warp => "C",
         Target::Cpp => "CXX",
         Target::Cuda => "C CUDA",
     };
@@ -147,8 +154,9 @@ fn snake_case(name: &str) -> String {
     for (place, &letter) in letters.iter().enumerate() {
         let before = place.checked_sub(1).map(|before| letters[before]);
         let after = letters.get(place + 1);
+        // A capital begins a word after a small letter, and before one.
         let begins = before.is_some_and(|before| {
-            !before.is_uppercase() && before != '_' || after.is_some_and(|after| after.is_lowercase()) && before != '_'
+            before != '_' && (!before.is_uppercase() || after.is_some_and(|after| after.is_lowercase()))
         });
         if letter.is_uppercase() && begins {
             snake.push('_');

@@ -32,6 +32,19 @@ pub(super) fn header(precision: Precision) -> String {
     guarded(precision, "", includes, &parts)
 }
 
+/// Returns the functions of the header of scalars, without macros and without the types that hosts need.
+pub(super) fn bare(precision: Precision) -> String {
+    let header = header(precision);
+    let end = format!("}} energy_{}_element;\n", precision.name());
+    let begin = header.find("/* Operations that are rounded once.");
+    let host = header.find("/* What a host may ask of an element. */");
+    let numbers = begin.zip(host).and_then(|(begin, host)| header.get(begin..host));
+    let others = header.split_once(&end).map(|(_, others)| others.trim_end().trim_end_matches("#endif"));
+    let (numbers, others) =
+        numbers.zip(others).expect("compiler bug: the header has numbers, then descriptions of elements");
+    format!("{numbers}{others}")
+}
+
 /// Returns the text of the header of loops over elements.
 pub(super) fn loops(precision: Precision) -> String {
     let includes = format!("#include \"energy_{}.h\"\n\n", precision.name());

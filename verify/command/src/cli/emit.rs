@@ -18,6 +18,8 @@ enum Language {
     Cpp,
     /// CUDA C++: functions for host and device, and kernels with one element a thread.
     Cuda,
+    /// A Python module of functions for kernels of Warp, with adjoints.
+    Warp,
 }
 
 /// The numbers to write for.
@@ -28,10 +30,10 @@ enum Numbers {
     Both,
 }
 
-/// Writes elements as C, C++ or CUDA: a folder that needs nothing else, and compiles to the bits of the Rust library.
+/// Writes elements as C, C++, CUDA or Warp: a folder that needs nothing else, and compiles to the bits of the Rust library.
 ///
 /// Each element gets its value and exact derivatives, those of single vertices too, and loops over many elements.
-/// README.md in the folder says how to compile it.
+/// README.md in the folder says how to compile it. For Warp, the folder has one Python module, `energies.py`.
 #[derive(Args)]
 pub struct Emit {
     /// Elements of the catalogue, and files of declarations (`.energy`).
@@ -61,6 +63,7 @@ impl Emit {
             Language::C => Target::C,
             Language::Cpp => Target::Cpp,
             Language::Cuda => Target::Cuda,
+            Language::Warp => Target::Warp,
         };
         let precisions: &[Precision] = match self.precision {
             Numbers::F64 => &[Precision::Double],
