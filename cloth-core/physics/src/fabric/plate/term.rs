@@ -81,6 +81,15 @@ pub enum PlateError {
     /// A triangle has no warp direction.
     #[error(transparent)]
     Threads(#[from] ThreadError),
+    /// Neighbours run the same way along their edge: the sense of an angle differs between them.
+    #[error(
+        "triangles {} and {} are neighbours with opposite fronts; turn the corners of one around, in Blender by Mesh > \
+         Normals > Recalculate Outside", .triangles[0], .triangles[1]
+    )]
+    Unoriented {
+        /// The two triangles.
+        triangles: [usize; 2],
+    },
 }
 
 impl PlateTerm {
