@@ -38,7 +38,7 @@ pub enum LocalErrorFailure {
         /// Start of the window, in s.
         start: f64,
         /// The reason.
-        source: SimulationError,
+        source: Box<SimulationError>,
     },
 }
 
@@ -120,7 +120,7 @@ pub fn measure(
     let (mut windows, mut work) = (Vec::new(), Totals::default());
     for ((&at, state), end) in starts.iter().zip(states).zip(ends) {
         let time = at as f64 * step;
-        let failed = |source| LocalErrorFailure::Window { start: time, source };
+        let failed = |source| LocalErrorFailure::Window { start: time, source: Box::new(source) };
         let mut simulation = start(scene)?;
         let restored = simulation.restore(state.after_other_steps(at));
         restored.map_err(|error: RestoreError| failed(error.into()))?;
