@@ -4,6 +4,8 @@
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
+use cloth_core::Simulation;
+use cloth_core::scene::Scene;
 use tempfile::TempDir;
 
 use crate::runs::with_scene;
@@ -75,8 +77,10 @@ const SHEET: &str = "dt = 0.01\nduration = 0.2\nintegrator = \"newton\"\ntoleran
 
 #[test]
 fn the_local_error_of_a_scene_falls_with_its_step() {
-    let folder = with_scene(SHEET);
-    std::fs::write(folder.path().join("half.toml"), SHEET.replace("dt = 0.01", "dt = 0.005")).unwrap();
+    // Contact is not smooth; a sheet that swings is.
+    let swinging = SHEET.split("obstacles").next().unwrap();
+    let folder = with_scene(swinging);
+    std::fs::write(folder.path().join("half.toml"), swinging.replace("dt = 0.01", "dt = 0.005")).unwrap();
     let measured = |scene: &str| -> serde_json::Value {
         let told = cloth(&["bench", "--error", scene, "--json", "--threads", "1"], folder.path());
         assert!(told.status.success(), "{}", String::from_utf8_lossy(&told.stderr));
@@ -95,6 +99,34 @@ fn the_local_error_of_a_scene_falls_with_its_step() {
     assert!(table.contains("largest, mm") && table.contains("per simulated second"), "{table}");
     let refused = cloth(&["bench", "scene.toml"], folder.path());
     assert_eq!(refused.status.code(), Some(2), "{}", String::from_utf8_lossy(&refused.stderr));
+}
+
+/// Pins, an obstacle that moves and friction go on as they were.
+#[test]
+fn a_state_goes_on_in_a_simulation_with_another_step() {
+    let moving = SHEET.replace(
+        "friction = 0.3 }",
+        "friction = 0.3, motion.keys = [{ time = 0.0 }, { time = 0.2, translate = [0.0, 0.1, 0.1] }] }",
+    );
+    let moving = moving.replace("tolerances.velocity = 1e-3", "tolerances.velocity = 1e-6");
+    let scene = |step: f64| Scene::parse(&moving.replace("dt = 0.01", &format!("dt = {step}")), "s.toml".as_ref());
+    let [mut fine, mut same, mut coarse] =
+        [0.001, 0.001, 0.002].map(|step| Simulation::new(&scene(step).unwrap()).unwrap());
+    let go = |simulation: &mut Simulation, steps: usize| (0..steps).for_each(|_| assert!(simulation.step().is_ok()));
+    go(&mut fine, 100);
+    same.restore(fine.save().after_other_steps(100)).unwrap();
+    coarse.restore(fine.save().after_other_steps(50)).unwrap();
+    assert!((coarse.time() - fine.time()).abs() < 1e-12 && coarse.positions() == fine.positions());
+    go(&mut fine, 20);
+    go(&mut same, 20);
+    go(&mut coarse, 10);
+    let distance = |other: &Simulation| {
+        let apart = |(x, y): (&[f64; 3], &[f64; 3])| (0..3).map(|axis| (x[axis] - y[axis]).abs()).fold(0.0, f64::max);
+        fine.positions().iter().zip(other.positions()).map(apart).fold(0.0, f64::max)
+    };
+    // Only the first iterates differ with the same step.
+    assert!(distance(&same) < 1e-6, "{:e}", distance(&same));
+    assert!((1e-6..2e-3).contains(&distance(&coarse)), "{:e}", distance(&coarse));
 }
 
 #[test]

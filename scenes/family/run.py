@@ -31,6 +31,8 @@ def seconds(duration):
 def run(program, scene, threads):
     """Runs a scene. Returns its figures and what is wrong with it."""
     folder = scene.parent / "out"
+    # That of an earlier run would count if the scene is refused.
+    (folder / "run.json").unlink(missing_ok=True)
     before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
     command = [program, "run", scene, "-o", folder, "--overwrite", "--threads", str(threads)]
     done = subprocess.run([*command, "--check-crossings"], capture_output=True, text=True)
@@ -39,7 +41,7 @@ def run(program, scene, threads):
         done = subprocess.run(command, capture_output=True, text=True)
     user = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - before
     if not (folder / "run.json").exists():
-        return None, done.stderr.strip()
+        return None, done.stderr.strip() or f"no results, exit status {done.returncode}"
     record = json.loads((folder / "run.json").read_text(encoding="utf-8"))
     summary = record["summary"]
     steps, solves = max(summary["steps"], 1), max(summary["solves"], 1)
@@ -79,11 +81,16 @@ def error(program, scene, threads):
     return {"RMS mm": 1e3 * found["rms"], "largest mm": 1e3 * found["largest"]}, ""
 
 
+def shown(value):
+    """Returns a text, a whole number, or a number with three digits."""
+    if isinstance(value, str):
+        return value
+    return f"{value:.{0 if value >= 100 or value == int(value) else 1 if value >= 10 else 2}f}"
+
+
 def table(rows):
     """Returns rows of equal keys as aligned columns."""
-    text = lambda value: value if isinstance(value, str) else f"{value:.0f}" if value >= 100 or value == int(value) else (
-        f"{value:.1f}" if value >= 10 else f"{value:.2f}")
-    cells = [list(rows[0])] + [[text(value) for value in row.values()] for row in rows]
+    cells = [list(rows[0])] + [[shown(value) for value in row.values()] for row in rows]
     widths = [max(map(len, column)) for column in zip(*cells)]
     align = lambda row: "  ".join([row[0].ljust(widths[0])] + [c.rjust(w) for c, w in zip(row[1:], widths[1:])])
     return "\n".join(map(align, cells)) + "\n"
@@ -174,9 +181,9 @@ def main():
         if "ms/step" in row:
             rows.append(row)
             save(options.output, rows)
-    shown = lambda row: {key: value for key, value in row.items() if key not in ("against", "steps", "searches/step")}
+    hidden = ("against", "steps", "searches/step")
     if rows:
-        print(table([shown(row) for row in rows]))
+        print(table([{key: value for key, value in row.items() if key not in hidden} for row in rows]))
     compared = [row for row in rows if "against" in row]
     if compared:
         print(table(ratios(compared)))
