@@ -166,12 +166,7 @@ fn is_definite(&[[a, b, c], [_, d, e], [_, _, f]]: &[[f64; 3]; 3]) -> bool {
 }
 
 /// Subtracts the product of the exact Hessian with the velocities.
-pub(super) fn subtract_product(
-    of: &NodalMembrane,
-    found: &[Found],
-    state: State<'_>,
-    mut product: Sums<'_>,
-) {
+pub(super) fn subtract_product(of: &NodalMembrane, found: &[Found], state: State<'_>, mut product: Sums<'_>) {
     let mut rows = Vec::new();
     for (number, response) in found {
         let patch = &of.patches[of.active[*number]];

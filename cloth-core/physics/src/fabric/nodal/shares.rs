@@ -13,7 +13,8 @@ use super::term::{Chunk, NodalMembrane};
 impl NodalMembrane {
     /// Returns the chunks with a patch at one of these vertices.
     pub(super) fn chunks_at(&self, vertices: &Range<usize>) -> Vec<usize> {
-        let has_patch = |chunk: &Chunk| self.active[chunk.numbers.clone()].iter().any(|&p| meets(&self.patches[p], vertices));
+        let has_patch =
+            |chunk: &Chunk| self.active[chunk.numbers.clone()].iter().any(|&p| meets(&self.patches[p], vertices));
         (0..self.chunks.len()).filter(|&number| has_patch(&self.chunks[number])).collect()
     }
 
@@ -34,7 +35,8 @@ impl NodalMembrane {
 
     /// Returns the tally of a share. The first counts the patches of all.
     fn tally_of(&self, share: &Share, flagged: u64) -> Tally {
-        if share.number == 0 { self.tally(flagged) } else { Tally { flagged, ..Tally::default() } }
+        let is_first = share.vertices.start == 0;
+        if is_first { self.tally(flagged) } else { Tally { flagged, ..Tally::default() } }
     }
 }
 

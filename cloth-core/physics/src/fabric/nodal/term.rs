@@ -184,11 +184,6 @@ impl NodalMembrane {
         self.chunks.iter().flat_map(|chunk| self.responses(chunk, x, order).0).collect()
     }
 
-    /// The share of a single thread.
-    fn whole(&self, vertices: usize, blocks: usize) -> Share {
-        Share { number: 0, vertices: 0..vertices, blocks: 0..blocks }
-    }
-
     /// Returns the laws of active patches with these numbers, which ascend.
     fn chunks_of(&self, numbers: &[usize]) -> Vec<Chunk> {
         let (mut chunks, mut first) = (Vec::new(), 0);
@@ -218,6 +213,11 @@ impl NodalMembrane {
             }
         }
     }
+}
+
+/// Returns the share of a single thread, for which all chunks are evaluated.
+fn whole(vertices: usize, blocks: usize) -> Share {
+    Share { number: usize::MAX, vertices: 0..vertices, blocks: 0..blocks }
 }
 
 impl TermDescription for NodalMembrane {
@@ -334,7 +334,7 @@ impl PlacedTerm for NodalMembrane {
     }
 
     fn add_force(&self, state: State<'_>, force: &mut [Vector3<f64>]) -> Tally {
-        self.add_force_of(&self.whole(force.len(), 0), state, force)
+        self.add_force_of(&whole(force.len(), 0), state, force)
     }
 
     fn add_linearisation(&self, state: State<'_>, sum: &mut Linearisation<'_>) -> Tally {
@@ -342,7 +342,7 @@ impl PlacedTerm for NodalMembrane {
             Blocks::Single(matrix) => matrix.len(),
             Blocks::Double(matrix) => matrix.len(),
         };
-        self.add_linearisation_of(&self.whole(sum.force.len(), blocks), state, sum)
+        self.add_linearisation_of(&whole(sum.force.len(), blocks), state, sum)
     }
 
     fn find_non_finite(&self, _: Quantity, state: State<'_>) -> Option<usize> {
