@@ -38,20 +38,30 @@ impl PatchSlots {
     }
 
     /// Adds Σ aᵢₖ bⱼₖᵀ + m 1 to the block of each pair, given the factors of the vertices and, by pairs i ≤ j, the
-    /// multiples m of the identity; no multiples stand for zeros.
+    /// multiples m of the identity; no multiples stand for zeros. `matrix` begins with block `first`; others are left
+    /// out.
     #[inline(always)]
-    pub fn add<T: Precision>(&self, factors: &[[Factors<T>; 3]], multiples: Option<&[T]>, matrix: &mut [Block<T>]) {
+    pub fn add<T: Precision>(
+        &self,
+        factors: &[[Factors<T>; 3]],
+        multiples: Option<&[T]>,
+        first: usize,
+        matrix: &mut [Block<T>],
+    ) {
         let (mut slots, mut mirrored) = (self.slots.iter(), self.mirrored.iter());
         let mut pair = 0;
         for i in 0..factors.len() {
             for j in i..factors.len() {
                 let Some(&slot) = slots.next() else { return };
                 let multiple = multiples.map(|all| all[pair]);
-                add_outer_product(&mut matrix[slot as usize], &factors[i], &factors[j], multiple);
+                if let Some(block) = matrix.get_mut((slot as usize).wrapping_sub(first)) {
+                    add_outer_product(block, &factors[i], &factors[j], multiple);
+                }
                 if i != j
                     && let Some(&slot) = mirrored.next()
+                    && let Some(block) = matrix.get_mut((slot as usize).wrapping_sub(first))
                 {
-                    add_outer_product(&mut matrix[slot as usize], &factors[j], &factors[i], multiple);
+                    add_outer_product(block, &factors[j], &factors[i], multiple);
                 }
                 pair += 1;
             }

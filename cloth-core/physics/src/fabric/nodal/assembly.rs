@@ -9,9 +9,11 @@ use super::term::NodalMembrane;
 use crate::fabric::patch_blocks::{Factors, GROUP, Row};
 use crate::geometry::dot;
 
-/// Returns the mean strains of the active patches.
+/// Returns the mean strains of patches.
 pub(super) struct Strains<'a> {
     pub of: &'a NodalMembrane,
+    /// Indices of the patches.
+    pub patches: &'a [usize],
     pub x: &'a [Vector3<f64>],
 }
 
@@ -20,20 +22,30 @@ impl Kernel for Strains<'_> {
 
     #[inline(always)]
     fn run<L: Level>(self) -> Vec<Strain> {
-        let mut strains = vec![[0.0; 3]; self.of.active.len()];
-        for (strain, &patch) in strains.iter_mut().zip(&self.of.active) {
+        let mut strains = vec![[0.0; 3]; self.patches.len()];
+        for (strain, &patch) in strains.iter_mut().zip(self.patches) {
             *strain = self.of.patches[patch].strain(self.x);
         }
         strains
     }
 }
 
+/// A patch among the active ones, and its response.
+pub(super) type Found = (usize, Response);
+
+/// Consecutive vertices of a sum.
+pub(super) struct Sums<'a> {
+    /// The first vertex.
+    pub first: usize,
+    pub vectors: &'a mut [Vector3<f64>],
+}
+
 /// Subtracts Σ S : ∂Ē/∂x.
 pub(super) struct Forces<'a> {
     pub of: &'a NodalMembrane,
-    pub responses: &'a [Response],
+    pub found: &'a [Found],
     pub x: &'a [Vector3<f64>],
-    pub force: &'a mut [Vector3<f64>],
+    pub force: Sums<'a>,
 }
 
 impl Kernel for Forces<'_> {
@@ -41,21 +53,21 @@ impl Kernel for Forces<'_> {
 
     #[inline(always)]
     fn run<L: Level>(self) {
-        let Self { of, responses, x, force } = self;
+        let Self { of, found, x, mut force } = self;
         let mut rows = Vec::new();
-        for (&patch, response) in of.active.iter().zip(responses) {
-            let patch = &of.patches[patch];
+        for (number, response) in found {
+            let patch = &of.patches[of.active[*number]];
             rows.clear();
             patch.append_gradients(x, &mut rows);
-            subtract_gradient(&rows, &patch.vertices, &response.stress, force);
+            subtract_gradient(&rows, &patch.vertices, &response.stress, &mut force);
         }
     }
 }
 
 #[inline(always)]
-fn subtract_gradient(rows: &[Row<f64>], vertices: &[usize], stress: &Strain, force: &mut [Vector3<f64>]) {
+fn subtract_gradient(rows: &[Row<f64>], vertices: &[usize], stress: &Strain, sums: &mut Sums<'_>) {
     for (row, &vertex) in rows.iter().zip(vertices) {
-        let force = &mut force[vertex];
+        let Some(force) = sums.vectors.get_mut(vertex.wrapping_sub(sums.first)) else { continue };
         for axis in 0..3 {
             force[axis] -= stress[0] * row[0][axis] + stress[1] * row[1][axis] + stress[2] * row[2][axis];
         }
@@ -65,11 +77,13 @@ fn subtract_gradient(rows: &[Row<f64>], vertices: &[usize], stress: &Strain, for
 /// Subtracts Σ S : ∂Ē/∂x, and adds `scale` times the Hessian, Σ ∂Ē/∂xᵀ (∂S/∂E) ∂Ē/∂x + S : ∂²Ē/∂x².
 pub(super) struct Hessians<'a, T> {
     pub of: &'a NodalMembrane,
-    pub responses: &'a [Response],
+    pub found: &'a [Found],
     pub x: &'a [Vector3<f64>],
     pub scale: f64,
     pub curvature: Curvature,
-    pub force: &'a mut [Vector3<f64>],
+    pub force: Sums<'a>,
+    /// The first block of the matrix.
+    pub first: usize,
     pub matrix: &'a mut [Block<T>],
 }
 
@@ -78,21 +92,20 @@ impl<T: Precision> Kernel for Hessians<'_, T> {
 
     #[inline(always)]
     fn run<L: Level>(self) {
-        let Self { of, responses, x, scale, curvature, force, matrix } = self;
+        let Self { of, found, x, scale, curvature, mut force, first: first_block, matrix } = self;
         let (mut rows, mut factors) = (Vec::<Row<f64>>::new(), Vec::<[Factors<T>; 3]>::new());
         let mut multiples = Vec::<T>::new();
-        let groups = of.active.chunks(GROUP).zip(responses.chunks(GROUP)).zip(of.slots.chunks(GROUP));
-        for ((patches, responses), slots) in groups {
+        for group in found.chunks(GROUP) {
             rows.clear();
             multiples.clear();
-            patches.iter().for_each(|&patch| of.patches[patch].append_gradients(x, &mut rows));
+            group.iter().for_each(|(number, _)| of.patches[of.active[*number]].append_gradients(x, &mut rows));
             factors.resize(rows.len(), [Factors::zeros(); 3]);
             let mut first = 0;
-            for (&patch, response) in patches.iter().zip(responses) {
-                let patch = &of.patches[patch];
+            for (number, response) in group {
+                let patch = &of.patches[of.active[*number]];
                 let own = first..first + patch.vertices.len();
                 first = own.end;
-                subtract_gradient(&rows[own.clone()], &patch.vertices, &response.stress, force);
+                subtract_gradient(&rows[own.clone()], &patch.vertices, &response.stress, &mut force);
                 let (moduli, stress) = match curvature {
                     Curvature::Exact => (response.moduli, response.stress),
                     _ => changed(response, curvature),
@@ -104,10 +117,11 @@ impl<T: Precision> Kernel for Hessians<'_, T> {
                 }
             }
             let (mut left, mut multiples) = (&factors[..], &multiples[..]);
-            for slots in slots {
+            for (number, _) in group {
+                let slots = &of.slots[*number];
                 let (own, others) = left.split_at(slots.vertices);
                 let (of_pairs, of_others) = multiples.split_at(slots.vertices * (slots.vertices + 1) / 2);
-                slots.add(own, Some(of_pairs), matrix);
+                slots.add(own, Some(of_pairs), first_block, matrix);
                 (left, multiples) = (others, of_others);
             }
         }
@@ -152,24 +166,19 @@ fn is_definite(&[[a, b, c], [_, d, e], [_, _, f]]: &[[f64; 3]; 3]) -> bool {
 }
 
 /// Subtracts the product of the exact Hessian with the velocities.
-pub(super) fn subtract_product(
-    of: &NodalMembrane,
-    responses: &[Response],
-    state: State<'_>,
-    product: &mut [Vector3<f64>],
-) {
+pub(super) fn subtract_product(of: &NodalMembrane, found: &[Found], state: State<'_>, mut product: Sums<'_>) {
     let mut rows = Vec::new();
-    for (&patch, response) in of.active.iter().zip(responses) {
-        let patch = &of.patches[patch];
+    for (number, response) in found {
+        let patch = &of.patches[of.active[*number]];
         rows.clear();
         patch.append_gradients(state.x, &mut rows);
         let moved = |(row, &vertex): (&Row<f64>, &usize)| row.map(|[x, y, z, _]| dot([x, y, z], state.v[vertex]));
         let rates = rows.iter().zip(&patch.vertices).map(moved);
         let rate = rates.fold([0.0; 3], |sum: [f64; 3], one| std::array::from_fn(|k| sum[k] + one[k]));
-        subtract_gradient(&rows, &patch.vertices, &response.moduli.map(|row| dot(row, rate)), product);
+        subtract_gradient(&rows, &patch.vertices, &response.moduli.map(|row| dot(row, rate)), &mut product);
         // The second part has the form of a gradient, at the velocities.
         rows.clear();
         patch.append_gradients(state.v, &mut rows);
-        subtract_gradient(&rows, &patch.vertices, &response.stress, product);
+        subtract_gradient(&rows, &patch.vertices, &response.stress, &mut product);
     }
 }

@@ -161,3 +161,26 @@ fn clamped_hessians_have_no_negative_curvature() {
         assert!(clamped >= 0.0 && exact < clamped, "{material:?}: {exact} and {clamped}");
     }
 }
+
+#[test]
+fn threads_do_not_change_a_bit() {
+    let mesh = irregular(40, 6);
+    let x = deformed(&mesh, 0.002, 8);
+    for material in [materials().remove(1), materials().remove(6)] {
+        let [alone, others @ ..] = [1, 2, 3].map(|threads| {
+            let mut system = system(&mesh, material.clone(), Strain::Nodal);
+            system.set_threads(threads);
+            let energy = energy(&mut system, &x);
+            let mut matrix = system.matrix();
+            let weights = Weights { position: -1.0, velocity: 0.0 };
+            let mut options = LinearisationOptions::new(weights, Curvature::Clamped);
+            options.stiffness_times_velocity = true;
+            let linear = system.linearise(State { x: &x, v: &x }, options, &mut matrix).unwrap();
+            let mut product = vec![[0.0; 3]; x.len()];
+            matrix.multiply(&x, &mut product);
+            (energy, linear.force.to_vec(), linear.stiffness_times_velocity.to_vec(), product)
+        });
+        assert!(alone.2.as_flattened().iter().any(|rate| rate.abs() > 0.0));
+        others.iter().for_each(|other| assert!(*other == alone, "{material:?}"));
+    }
+}

@@ -111,7 +111,7 @@ impl<T: Precision> Kernel for OuterProducts<'_, T> {
             let mut left = &factors[..];
             for patch_slots in patch_slots {
                 let (own, others) = left.split_at(patch_slots.vertices);
-                patch_slots.add(own, None, matrix);
+                patch_slots.add(own, None, 0, matrix);
                 left = others;
             }
         }
