@@ -6,6 +6,9 @@
 //! r = a ∫ dt/√(1 − t⁴), thickness 2 a ∫ t²/√(1 − t⁴) dt, volume 2π a³ ∫ t⁴/√(1 − t⁴) dt
 //!
 //! with t from 0 to 1.
+//!
+//! The goals are 4 % with 20,000 N/m and 8 % with 100,000 N/m. The volume misses both, radius and thickness the second:
+//! their limits are near what they have today.
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -27,10 +30,11 @@ const PRESSURE: f64 = 100.0;
 
 /// Drag per mass, in 1/s: the balloon is at rest after [`TIME`].
 const DRAG: f64 = 10.0;
-/// Step and duration, in s. Steps of 20 ms are too long: the discs wrinkle within a few milliseconds.
+/// Step and duration, in s. Runs with steps of 20 ms stopped; the cause is not known.
 const STEP: f64 = 2e-3;
 const TIME: f64 = 0.5;
-/// Height of the discs at the start, in m, and the number of slight waves around them.
+/// Height of the discs at the start, in m, and the number of slight waves around them. With 20,000 N/m, the volume is
+/// 4.5, 4.3, 5.4, 4.7 and 5.5 % too small with 0, 8, 16, 24 and 32 waves.
 const LIFT: f64 = 0.01;
 const WAVES: f64 = 8.0;
 
@@ -158,10 +162,10 @@ pub(super) fn ask(quick: bool, report: &mut dyn FnMut(Finding)) -> Result<(), Va
         return Ok(());
     }
     let exact = exact();
-    for (stiffness, limit) in [(2e3, 0.02), (2e4, 0.06), (1e5, 0.14)] {
+    for (stiffness, limits) in [(2e3, [0.02; 3]), (2e4, [0.06, 0.02, 0.02]), (1e5, [0.14, 0.12, 0.12])] {
         let [nodal, plain] =
             [inflated(stiffness, Strain::Nodal, EDGE)?, inflated(stiffness, Strain::PerTriangle, EDGE)?];
-        for (name, of) in QUANTITIES {
+        for ((name, of), limit) in QUANTITIES.into_iter().zip(limits) {
             let case = format!("balloon, {stiffness} N/m: {name} (triangles: {:.3})", of(&plain));
             report(Finding::relative("locking", case, of(&nodal), of(&exact), limit));
         }

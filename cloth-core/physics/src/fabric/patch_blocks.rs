@@ -1,6 +1,6 @@
 //! Sums of outer products over patches of vertices, with the blocks of a matrix to which they are added.
 
-use energy_dsl::Block;
+use energy_dsl::{Block, Level};
 use energy_solve::{DofMap, Pattern, Precision, Restriction, Storage, index};
 
 /// Slots of the blocks of a patch: of the pairs i ≤ j, and of the mirrored pairs if the matrix stores both triangles.
@@ -41,29 +41,42 @@ impl PatchSlots {
     /// multiples m of the identity; no multiples stand for zeros. `matrix` begins with block `first`; others are left
     /// out.
     #[inline(always)]
-    pub fn add<T: Precision>(
+    pub fn add<L: Level, T: Precision>(
         &self,
         factors: &[[Factors<T>; 3]],
         multiples: Option<&[T]>,
         first: usize,
         matrix: &mut [Block<T>],
     ) {
-        let (mut slots, mut mirrored) = (self.slots.iter(), self.mirrored.iter());
-        let mut pair = 0;
+        let (mut slots, mut left) = (&self.slots[..], multiples);
         for i in 0..factors.len() {
-            for j in i..factors.len() {
-                let Some(&slot) = slots.next() else { return };
-                let multiple = multiples.map(|all| all[pair]);
+            let (of_row, others) = slots.split_at(factors.len() - i);
+            let of_pairs = left.map(|all| all.split_at(of_row.len()));
+            let row = Left::of(&factors[i]);
+            for (number, (&slot, other)) in of_row.iter().zip(&factors[i..]).enumerate() {
                 if let Some(block) = matrix.get_mut((slot as usize).wrapping_sub(first)) {
-                    add_outer_product(block, &factors[i], &factors[j], multiple);
+                    row.add::<L>(other, of_pairs.map(|(own, _)| own[number]), block);
                 }
-                if i != j
-                    && let Some(&slot) = mirrored.next()
-                    && let Some(block) = matrix.get_mut((slot as usize).wrapping_sub(first))
-                {
-                    add_outer_product(block, &factors[j], &factors[i], multiple);
-                }
-                pair += 1;
+            }
+            (slots, left) = (others, of_pairs.map(|(_, others)| others));
+        }
+        if !self.mirrored.is_empty() {
+            self.add_mirrored::<L, T>(factors, multiples, first, matrix);
+        }
+    }
+
+    /// Adds to the blocks of the lower triangle.
+    fn add_mirrored<L: Level, T: Precision>(
+        &self,
+        factors: &[[Factors<T>; 3]],
+        multiples: Option<&[T]>,
+        first: usize,
+        matrix: &mut [Block<T>],
+    ) {
+        let pairs = (0..factors.len()).flat_map(|i| (i..factors.len()).map(move |j| (i, j))).enumerate();
+        for ((pair, (i, j)), &slot) in pairs.filter(|(_, (i, j))| i != j).zip(&self.mirrored) {
+            if let Some(block) = matrix.get_mut((slot as usize).wrapping_sub(first)) {
+                Left::of(&factors[j]).add::<L>(&factors[i], multiples.map(|all| all[pair]), block);
             }
         }
     }
@@ -106,23 +119,37 @@ impl<T: Precision> Factors<T> {
     }
 }
 
-/// A ← A + Σ aₖ bₖᵀ + m 1.
-#[inline(always)]
-fn add_outer_product<T: Precision>(sum: &mut Block<T>, a: &[Factors<T>; 3], b: &[Factors<T>; 3], multiple: Option<T>) {
-    // All products come before the first sum is written: the compiler cannot tell that A is apart from the factors.
-    let product = |k: usize, entry: usize| a[k].left[entry] * b[k].right[entry];
-    let last = |k: usize| a[k].last[0] * b[k].last[1];
-    let mut eight = [T::from_f64(0.0); 8];
-    for entry in 0..8 {
-        eight[entry] = product(0, entry) + product(1, entry) + product(2, entry);
+/// The left factors of a row of blocks. In a copy of its own, the compiler keeps them in registers: it cannot tell that
+/// the blocks are apart from the factors.
+struct Left<T> {
+    eight: [[T; 8]; 3],
+    last: [T; 3],
+}
+
+impl<T: Precision> Left<T> {
+    #[inline(always)]
+    fn of(factors: &[Factors<T>; 3]) -> Self {
+        Self { eight: [0, 1, 2].map(|k| factors[k].left), last: [0, 1, 2].map(|k| factors[k].last[0]) }
     }
-    let mut ninth = last(0) + last(1) + last(2);
-    if let Some(multiple) = multiple {
-        (eight[0], eight[4], ninth) = (eight[0] + multiple, eight[4] + multiple, ninth + multiple);
+
+    /// A ← A + Σ aₖ bₖᵀ + m 1.
+    #[inline(always)]
+    fn add<L: Level>(&self, right: &[Factors<T>; 3], multiple: Option<T>, sum: &mut Block<T>) {
+        // All products come before the first sum is written.
+        let numbers = sum.as_flattened_mut();
+        let mut eight = [T::from_f64(0.0); 8];
+        for entry in 0..8 {
+            let mut product = self.eight[0][entry].mul_add::<L>(right[0].right[entry], numbers[entry]);
+            product = self.eight[1][entry].mul_add::<L>(right[1].right[entry], product);
+            eight[entry] = self.eight[2][entry].mul_add::<L>(right[2].right[entry], product);
+        }
+        let mut ninth = self.last[0].mul_add::<L>(right[0].last[1], numbers[8]);
+        ninth = self.last[1].mul_add::<L>(right[1].last[1], ninth);
+        ninth = self.last[2].mul_add::<L>(right[2].last[1], ninth);
+        if let Some(multiple) = multiple {
+            (eight[0], eight[4], ninth) = (eight[0] + multiple, eight[4] + multiple, ninth + multiple);
+        }
+        numbers[..8].copy_from_slice(&eight);
+        numbers[8] = ninth;
     }
-    let sum = sum.as_flattened_mut();
-    for entry in 0..8 {
-        sum[entry] = sum[entry] + eight[entry];
-    }
-    sum[8] = sum[8] + ninth;
 }

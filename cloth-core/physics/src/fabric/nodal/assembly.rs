@@ -121,7 +121,7 @@ impl<T: Precision> Kernel for Hessians<'_, T> {
                 let slots = &of.slots[*number];
                 let (own, others) = left.split_at(slots.vertices);
                 let (of_pairs, of_others) = multiples.split_at(slots.vertices * (slots.vertices + 1) / 2);
-                slots.add(own, Some(of_pairs), first_block, matrix);
+                slots.add::<L, T>(own, Some(of_pairs), first_block, matrix);
                 (left, multiples) = (others, of_others);
             }
         }

@@ -92,11 +92,13 @@ impl<T: Precision> Kernel for OuterProducts<'_, T> {
     fn run<L: Level>(self) {
         let Self { of, angles, s, matrix } = self;
         let s = T::from_f64(s);
+        let converted = |gradients: &[[f64; 4]; 4]| gradients.map(|gradient| gradient.map(T::from_f64));
+        let gradients: Vec<[[T; 4]; 4]> = angles.gradients.iter().map(converted).collect();
         let (mut rows, mut factors): (Vec<Row<T>>, Vec<[Factors<T>; 3]>) = (Vec::new(), Vec::new());
         for (patches, patch_slots) in of.active.chunks(GROUP).zip(of.patch_slots.chunks(GROUP)) {
             rows.clear();
             for &patch in patches {
-                of.patches[patch].append_gradients(&angles.gradients, &mut rows);
+                of.patches[patch].append_gradients::<L, T>(&gradients, &mut rows);
             }
             // Written in place: pushes would spill the registers.
             factors.resize(rows.len(), [Factors::zeros(); 3]);
@@ -111,7 +113,7 @@ impl<T: Precision> Kernel for OuterProducts<'_, T> {
             let mut left = &factors[..];
             for patch_slots in patch_slots {
                 let (own, others) = left.split_at(patch_slots.vertices);
-                patch_slots.add(own, None, 0, matrix);
+                patch_slots.add::<L, T>(own, None, 0, matrix);
                 left = others;
             }
         }

@@ -21,8 +21,12 @@
 //! free edges the natural condition, zero bending moment, eliminates p.
 
 mod assembly;
+mod friction;
+mod patch;
 mod rigidity;
 mod term;
+#[cfg(test)]
+mod tests;
 mod tilt;
 
 pub use rigidity::{Rigidity, RigidityError};
