@@ -37,48 +37,51 @@ impl PatchSlots {
         Self { vertices: self.vertices, slots: slots(&self.slots), mirrored: slots(&self.mirrored) }
     }
 
-    /// Adds Σ aᵢₖ bⱼₖᵀ + m 1 to the block of each pair, given the factors of the vertices and, by pairs i ≤ j, the
-    /// multiples m of the identity; no multiples stand for zeros. `matrix` begins with block `first`; others are left
-    /// out.
+    /// Adds s Σ aᵢₖ bⱼₖᵀ + m 1 to the block of each pair, given the rows a and b of the vertices and, by pairs i ≤ j, the
+    /// multiples m of the identity; no multiples stand for zeros.
     #[inline(always)]
     pub fn add<L: Level, T: Precision>(
         &self,
-        factors: &[[Factors<T>; 3]],
+        (s, a, b): (T, &[Row<T>], &[Right<T>]),
         multiples: Option<&[T]>,
-        first: usize,
-        matrix: &mut [Block<T>],
+        to: &mut BlocksFrom<'_, T>,
     ) {
         let (mut slots, mut left) = (&self.slots[..], multiples);
-        for i in 0..factors.len() {
-            let (of_row, others) = slots.split_at(factors.len() - i);
+        for (i, row) in a.iter().enumerate() {
+            let (of_row, others) = slots.split_at(a.len() - i);
             let of_pairs = left.map(|all| all.split_at(of_row.len()));
-            let row = Left::of(&factors[i]);
-            for (number, (&slot, other)) in of_row.iter().zip(&factors[i..]).enumerate() {
-                if let Some(block) = matrix.get_mut((slot as usize).wrapping_sub(first)) {
-                    row.add::<L>(other, of_pairs.map(|(own, _)| own[number]), block);
+            let row = Left::of(s, row);
+            for (number, (&slot, right)) in of_row.iter().zip(&b[i..]).enumerate() {
+                if let Some(block) = to.block(slot) {
+                    row.add::<L>(right, of_pairs.map(|(own, _)| own[number]), block);
                 }
             }
             (slots, left) = (others, of_pairs.map(|(_, others)| others));
         }
-        if !self.mirrored.is_empty() {
-            self.add_mirrored::<L, T>(factors, multiples, first, matrix);
-        }
-    }
-
-    /// Adds to the blocks of the lower triangle.
-    fn add_mirrored<L: Level, T: Precision>(
-        &self,
-        factors: &[[Factors<T>; 3]],
-        multiples: Option<&[T]>,
-        first: usize,
-        matrix: &mut [Block<T>],
-    ) {
-        let pairs = (0..factors.len()).flat_map(|i| (i..factors.len()).map(move |j| (i, j))).enumerate();
+        // The mirrored block is the transposed one.
+        let pairs = (0..a.len()).flat_map(|i| (i..a.len()).map(move |j| (i, j))).enumerate();
         for ((pair, (i, j)), &slot) in pairs.filter(|(_, (i, j))| i != j).zip(&self.mirrored) {
-            if let Some(block) = matrix.get_mut((slot as usize).wrapping_sub(first)) {
-                Left::of(&factors[j]).add::<L>(&factors[i], multiples.map(|all| all[pair]), block);
+            if let Some(block) = to.block(slot) {
+                let mut added = [[T::from_f64(0.0); 3]; 3];
+                Left::of(s, &a[i]).add::<L>(&b[j], multiples.map(|all| all[pair]), &mut added);
+                for row in 0..3 {
+                    (0..3).for_each(|column| block[row][column] = block[row][column] + added[column][row]);
+                }
             }
         }
+    }
+}
+
+/// Blocks of a matrix from block `first` on. Others are left out.
+pub(super) struct BlocksFrom<'a, T> {
+    pub first: usize,
+    pub blocks: &'a mut [Block<T>],
+}
+
+impl<T> BlocksFrom<'_, T> {
+    #[inline(always)]
+    fn block(&mut self, slot: u32) -> Option<&mut Block<T>> {
+        self.blocks.get_mut((slot as usize).wrapping_sub(self.first))
     }
 }
 
@@ -95,59 +98,73 @@ pub(super) fn padded_stencils<'a>(patches: impl Iterator<Item = &'a [usize]> + C
 /// Three vectors, each padded to four components.
 pub(super) type Row<T> = [[T; 4]; 3];
 
-/// Two vectors a and b as the factors of a block, by entries: the first eight are added in one register.
-#[derive(Clone, Copy)]
-pub(super) struct Factors<T> {
-    /// a, each component three times.
-    left: [T; 8],
-    /// b, repeated.
-    right: [T; 8],
-    /// The factors of the last entry.
-    last: [T; 2],
+/// Converts vectors to another precision. Loops, as in all that kernels call: the closures of `array::map` are compiled
+/// without the instructions of the kernel.
+#[inline(always)]
+pub(super) fn converted<T: Precision, const N: usize>(vectors: &[[f64; 4]; N]) -> [[T; 4]; N] {
+    let mut converted = [[T::from_f64(0.0); 4]; N];
+    for (vector, number) in converted.iter_mut().zip(vectors) {
+        for axis in 0..4 {
+            vector[axis] = T::from_f64(number[axis]);
+        }
+    }
+    converted
 }
 
-impl<T: Precision> Factors<T> {
+/// Three vectors b as the right factors of blocks: each repeated, as the first eight entries need it, and its last
+/// component.
+#[derive(Clone, Copy)]
+pub(super) struct Right<T>([([T; 8], T); 3]);
+
+impl<T: Precision> Right<T> {
     #[inline(always)]
-    pub fn new(&[x, y, z, _]: &[T; 4], &[a, b, c, _]: &[T; 4]) -> Self {
-        Self { left: [x, x, x, y, y, y, z, z], right: [a, b, c, a, b, c, a, b], last: [z, c] }
+    pub fn of(row: &Row<T>) -> Self {
+        let of = |&[a, b, c, _]: &[T; 4]| ([a, b, c, a, b, c, a, b], c);
+        Self([of(&row[0]), of(&row[1]), of(&row[2])])
     }
 
     /// Returns zeros, to be overwritten.
     pub fn zeros() -> Self {
-        let zero = [T::from_f64(0.0); 4];
-        Self::new(&zero, &zero)
+        Self::of(&[[T::from_f64(0.0); 4]; 3])
     }
 }
 
-/// The left factors of a row of blocks. In a copy of its own, the compiler keeps them in registers: it cannot tell that
-/// the blocks are apart from the factors.
-struct Left<T> {
-    eight: [[T; 8]; 3],
-    last: [T; 3],
-}
+/// The left factors of a row of blocks, each component three times. In a copy of its own, the compiler keeps them in
+/// registers: it cannot tell that the blocks are apart from what they come from.
+struct Left<T>([([T; 8], T); 3]);
 
 impl<T: Precision> Left<T> {
     #[inline(always)]
-    fn of(factors: &[Factors<T>; 3]) -> Self {
-        Self { eight: [0, 1, 2].map(|k| factors[k].left), last: [0, 1, 2].map(|k| factors[k].last[0]) }
+    fn of(s: T, row: &Row<T>) -> Self {
+        let of = |&[x, y, z, _]: &[T; 4]| {
+            let (x, y, z) = (s * x, s * y, s * z);
+            ([x, x, x, y, y, y, z, z], z)
+        };
+        Self([of(&row[0]), of(&row[1]), of(&row[2])])
     }
 
     /// A ← A + Σ aₖ bₖᵀ + m 1.
     #[inline(always)]
-    fn add<L: Level>(&self, right: &[Factors<T>; 3], multiple: Option<T>, sum: &mut Block<T>) {
+    fn add<L: Level>(&self, Right(right): &Right<T>, multiple: Option<T>, sum: &mut Block<T>) {
         // All products come before the first sum is written.
         let numbers = sum.as_flattened_mut();
         let mut eight = [T::from_f64(0.0); 8];
         for entry in 0..8 {
-            let mut product = self.eight[0][entry].mul_add::<L>(right[0].right[entry], numbers[entry]);
-            product = self.eight[1][entry].mul_add::<L>(right[1].right[entry], product);
-            eight[entry] = self.eight[2][entry].mul_add::<L>(right[2].right[entry], product);
+            let mut product = self.0[0].0[entry].mul_add::<L>(right[0].0[entry], numbers[entry]);
+            product = self.0[1].0[entry].mul_add::<L>(right[1].0[entry], product);
+            eight[entry] = self.0[2].0[entry].mul_add::<L>(right[2].0[entry], product);
         }
-        let mut ninth = self.last[0].mul_add::<L>(right[0].last[1], numbers[8]);
-        ninth = self.last[1].mul_add::<L>(right[1].last[1], ninth);
-        ninth = self.last[2].mul_add::<L>(right[2].last[1], ninth);
+        let mut ninth = self.0[0].1.mul_add::<L>(right[0].1, numbers[8]);
+        ninth = self.0[1].1.mul_add::<L>(right[1].1, ninth);
+        ninth = self.0[2].1.mul_add::<L>(right[2].1, ninth);
         if let Some(multiple) = multiple {
-            (eight[0], eight[4], ninth) = (eight[0] + multiple, eight[4] + multiple, ninth + multiple);
+            // Not two sums: they would break the register into its entries.
+            let (zero, one) = (T::from_f64(0.0), T::from_f64(1.0));
+            let diagonal = [one, zero, zero, zero, one, zero, zero, zero];
+            for entry in 0..8 {
+                eight[entry] = multiple.mul_add::<L>(diagonal[entry], eight[entry]);
+            }
+            ninth = ninth + multiple;
         }
         numbers[..8].copy_from_slice(&eight);
         numbers[8] = ninth;

@@ -6,7 +6,7 @@ use energy_solve::{Curvature, Precision, State, change_dense};
 use super::law::{Response, Strain};
 use super::symmetric::with_eigenvalues;
 use super::term::NodalMembrane;
-use crate::fabric::patch_blocks::{Factors, GROUP, Row};
+use crate::fabric::patch_blocks::{BlocksFrom, GROUP, Right, Row, converted};
 use crate::geometry::dot;
 
 /// Returns the mean strains of patches.
@@ -92,14 +92,16 @@ impl<T: Precision> Kernel for Hessians<'_, T> {
 
     #[inline(always)]
     fn run<L: Level>(self) {
-        let Self { of, found, x, scale, curvature, mut force, first: first_block, matrix } = self;
-        let (mut rows, mut factors) = (Vec::<Row<f64>>::new(), Vec::<[Factors<T>; 3]>::new());
+        let Self { of, found, x, scale, curvature, mut force, first, matrix } = self;
+        let mut to = BlocksFrom { first, blocks: matrix };
+        let (mut rows, mut lefts, mut rights) = (Vec::<Row<f64>>::new(), Vec::<Row<T>>::new(), Vec::<Right<T>>::new());
         let mut multiples = Vec::<T>::new();
         for group in found.chunks(GROUP) {
             rows.clear();
             multiples.clear();
             group.iter().for_each(|(number, _)| of.patches[of.active[*number]].append_gradients(x, &mut rows));
-            factors.resize(rows.len(), [Factors::zeros(); 3]);
+            lefts.resize(rows.len(), [[T::from_f64(0.0); 4]; 3]);
+            rights.resize(rows.len(), Right::zeros());
             let mut first = 0;
             for (number, response) in group {
                 let patch = &of.patches[of.active[*number]];
@@ -110,36 +112,40 @@ impl<T: Precision> Kernel for Hessians<'_, T> {
                     Curvature::Exact => (response.moduli, response.stress),
                     _ => changed(response, curvature),
                 };
-                patch.append_stress_stiffness(&stress.map(|component| scale * component), &mut multiples);
-                for (factors, row) in factors[own.clone()].iter_mut().zip(&rows[own]) {
+                let [uu, vv, uv] = stress;
+                patch.append_stress_stiffness(&[scale * uu, scale * vv, scale * uv], &mut multiples);
+                for ((left, right), row) in lefts[own.clone()].iter_mut().zip(&mut rights[own.clone()]).zip(&rows[own])
+                {
+                    *left = converted(row);
                     // `black_box` keeps LLVM from vectorising this loop with scatters.
-                    write_factors(std::hint::black_box(factors), row, &moduli, scale);
+                    *std::hint::black_box(right) = Right::of(&times::<L, T>(&moduli, left));
                 }
             }
-            let (mut left, mut multiples) = (&factors[..], &multiples[..]);
+            let (mut first, mut multiples) = (0, &multiples[..]);
             for (number, _) in group {
                 let slots = &of.slots[*number];
-                let (own, others) = left.split_at(slots.vertices);
+                let own = first..first + slots.vertices;
+                first = own.end;
                 let (of_pairs, of_others) = multiples.split_at(slots.vertices * (slots.vertices + 1) / 2);
-                slots.add::<L, T>(own, Some(of_pairs), first_block, matrix);
-                (left, multiples) = (others, of_others);
+                let factors = (T::from_f64(scale), &lefts[own.clone()], &rights[own]);
+                slots.add::<L, T>(factors, Some(of_pairs), &mut to);
+                multiples = of_others;
             }
         }
     }
 }
 
-/// Writes the factors of `scale` ∂Ē/∂x and (∂S/∂E) ∂Ē/∂x of a vertex.
+/// Returns (∂S/∂E) ∂Ē/∂x of a vertex.
 #[inline(always)]
-fn write_factors<T: Precision>(factors: &mut [Factors<T>; 3], row: &Row<f64>, moduli: &[[f64; 3]; 3], scale: f64) {
+fn times<L: Level, T: Precision>(moduli: &[[f64; 3]; 3], row: &Row<T>) -> Row<T> {
+    let mut product = [[T::from_f64(0.0); 4]; 3];
     for k in 0..3 {
-        let (mut left, mut right) = ([T::from_f64(0.0); 4], [T::from_f64(0.0); 4]);
+        let [a, b, c] = [T::from_f64(moduli[k][0]), T::from_f64(moduli[k][1]), T::from_f64(moduli[k][2])];
         for axis in 0..4 {
-            left[axis] = T::from_f64(scale * row[k][axis]);
-            let [a, b, c] = [row[0][axis], row[1][axis], row[2][axis]];
-            right[axis] = T::from_f64(moduli[k][0] * a + moduli[k][1] * b + moduli[k][2] * c);
+            product[k][axis] = c.mul_add::<L>(row[2][axis], b.mul_add::<L>(row[1][axis], a * row[0][axis]));
         }
-        factors[k] = Factors::new(&left, &right);
     }
+    product
 }
 
 /// Returns moduli and stress with eigenvalues treated as `curvature` says. Either part of the Hessian is then positive

@@ -1,6 +1,6 @@
 //! Plates that yield: friction between yarns.
 
-use super::patch::{IDENTITY, Matrix, transposed_times};
+use super::patch::{IDENTITY, Matrix};
 use crate::geometry::dot;
 
 /// The energy of a triangle as a function of its r: U = ½ rᵀ E r + ½ ‖P r − p‖² with a plastic p, and E = 1 − PᵀP.
@@ -27,15 +27,22 @@ impl Friction {
     /// Returns P r − p.
     #[inline(always)]
     fn rest(&self, r: [f64; 3]) -> [f64; 3] {
-        std::array::from_fn(|k| dot(self.yielding[k], r) - self.plastic[k])
+        let ([a, b, c], [x, y, z]) = (self.yielding, self.plastic);
+        [dot(a, r) - x, dot(b, r) - y, dot(c, r) - z]
     }
 
     /// Returns U and ∂U/∂r.
     #[inline(always)]
     pub fn response(&self, r: [f64; 3]) -> (f64, [f64; 3]) {
-        let (elastic, rest) = (self.elastic.map(|row| dot(row, r)), self.rest(r));
-        let of_rest = transposed_times(&self.yielding, &rest);
-        (0.5 * (dot(elastic, r) + dot(rest, rest)), std::array::from_fn(|k| elastic[k] + of_rest[k]))
+        let [a, b, c] = self.elastic;
+        let (mut stress, rest) = ([dot(a, r), dot(b, r), dot(c, r)], self.rest(r));
+        let energy = 0.5 * (dot(stress, r) + dot(rest, rest));
+        for k in 0..3 {
+            for i in 0..3 {
+                stress[k] += self.yielding[i][k] * rest[i];
+            }
+        }
+        (energy, stress)
     }
 
     /// Moves the plastic part until ‖P r − p‖ is at most its limit.

@@ -1,7 +1,7 @@
 //! A triangle's bending: three combinations r of dihedral angles, the energy as their function, and its friction.
 
-use energy_dsl::Level;
-use energy_solve::Precision;
+use energy_dsl::{Level, Number};
+use energy_solve::{Precision, index};
 
 use super::Curvature;
 use super::rigidity::cholesky;
@@ -23,9 +23,27 @@ pub(super) struct Patch {
 
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Angle {
-    pub hinge: usize,
-    pub b: [f64; 3],
+    /// b, padded.
+    pub b: [f64; 4],
+    pub hinge: u32,
     pub local: [u8; 4],
+}
+
+impl Angle {
+    #[inline(always)]
+    pub fn hinge(&self) -> usize {
+        self.hinge as usize
+    }
+
+    #[inline(always)]
+    pub fn b(&self) -> [f64; 3] {
+        let [x, y, z, _] = self.b;
+        [x, y, z]
+    }
+}
+
+fn padded([x, y, z]: [f64; 3]) -> [f64; 4] {
+    [x, y, z, 0.0]
 }
 
 pub(super) type Matrix = [[f64; 3]; 3];
@@ -42,15 +60,16 @@ impl Patch {
         for &(hinge, b) in &curvature.angles {
             let mut b = scaled(&b);
             unreached.iter().for_each(|q| project_out(&mut b, q));
-            angles.push(Angle { hinge, b, local: [0; 4] });
+            angles.push(Angle { hinge: index(hinge), b: padded(b), local: [0; 4] });
         }
-        let largest = angles.iter().map(|angle| dot(angle.b, angle.b)).fold(0.0, f64::max);
-        angles.retain(|angle| dot(angle.b, angle.b) > 1e-24 * largest);
-        let mut vertices: Vec<usize> = angles.iter().flat_map(|angle| hinges[angle.hinge]).collect();
+        let square = |angle: &Angle| dot(angle.b(), angle.b());
+        let largest = angles.iter().map(square).fold(0.0, f64::max);
+        angles.retain(|angle| square(angle) > 1e-24 * largest);
+        let mut vertices: Vec<usize> = angles.iter().flat_map(|angle| hinges[angle.hinge()]).collect();
         vertices.sort_unstable();
         vertices.dedup();
         for angle in &mut angles {
-            angle.local = hinges[angle.hinge].map(|vertex| {
+            angle.local = hinges[angle.hinge()].map(|vertex| {
                 u8::try_from(vertices.partition_point(|&known| known < vertex)).expect("a patch has few vertices")
             });
         }
@@ -71,7 +90,7 @@ impl Patch {
         // ‖r‖² + ‖r′‖² = ‖Cᵀ r‖².
         let square = |i: usize, j: usize| IDENTITY[i][j] + dot(columns[i], columns[j]);
         let c = cholesky(&std::array::from_fn(|i| std::array::from_fn(|j| square(i, j))));
-        self.angles.iter_mut().for_each(|angle| angle.b = transposed_times(&c, &angle.b));
+        self.angles.iter_mut().for_each(|angle| angle.b = padded(transposed_times(&c, &angle.b())));
         // Columns of C⁻¹, whose product with its transpose is E.
         let inverse = IDENTITY.map(|axis| forward_substituted(&c, axis));
         let entry = |i: usize, j: usize| (0..3).map(|k| inverse[k][i] * inverse[k][j]).sum();
@@ -81,21 +100,23 @@ impl Patch {
 
     /// Returns the same patch, whose hinges have new indices.
     pub fn renumbered(&self, new_index: &[usize]) -> Self {
-        let angles = self.angles.iter().map(|angle| Angle { hinge: new_index[angle.hinge], ..*angle }).collect();
+        let angles =
+            self.angles.iter().map(|angle| Angle { hinge: index(new_index[angle.hinge()]), ..*angle }).collect();
         Self { vertices: self.vertices.clone(), angles, area: self.area, unreached: Vec::new() }
     }
 
     /// Returns r = Σ b (θ − θ̄).
     #[inline(always)]
-    pub fn residual(&self, values: &[f64]) -> [f64; 3] {
-        let mut r = [0.0; 3];
+    pub fn residual<L: Level>(&self, values: &[f64]) -> [f64; 3] {
+        let mut r = [0.0; 4];
         for angle in &self.angles {
-            let value = values[angle.hinge];
-            for k in 0..3 {
-                r[k] += angle.b[k] * value;
+            let value = values[angle.hinge()];
+            for k in 0..4 {
+                r[k] = Number::mul_add::<L>(angle.b[k], value, r[k]);
             }
         }
-        r
+        let [x, y, z, _] = r;
+        [x, y, z]
     }
 
     /// Appends ∇r: three vectors per vertex.
@@ -105,8 +126,8 @@ impl Patch {
         all.resize(first + self.vertices.len(), [[T::from_f64(0.0); 4]; 3]);
         let rows = &mut all[first..];
         for angle in &self.angles {
-            let gradient = &gradients[angle.hinge];
-            let b = angle.b.map(T::from_f64);
+            let gradient = &gradients[angle.hinge()];
+            let b = [T::from_f64(angle.b[0]), T::from_f64(angle.b[1]), T::from_f64(angle.b[2])];
             for point in 0..4 {
                 let row = &mut rows[angle.local[point] as usize];
                 for k in 0..3 {
@@ -139,7 +160,7 @@ fn project_out(vector: &mut [f64; 3], unit: &[f64; 3]) {
 }
 
 /// Returns Lᵀ b.
-pub(super) fn transposed_times(l: &Matrix, b: &[f64; 3]) -> [f64; 3] {
+fn transposed_times(l: &Matrix, b: &[f64; 3]) -> [f64; 3] {
     std::array::from_fn(|k| (0..3).map(|i| l[i][k] * b[i]).sum())
 }
 

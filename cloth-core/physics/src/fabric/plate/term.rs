@@ -10,7 +10,7 @@ use energy_solve::{
     Restriction, ScatterMaps, State, Stencils, Tally, Term, TermDescription, index,
 };
 
-use super::assembly::{CurvedPart, OuterProducts};
+use super::assembly::{CurvedPart, Energies, OuterProducts};
 use super::friction::Friction;
 use super::patch::{Angle, Matrix, Patch};
 use super::rigidity::cholesky;
@@ -188,14 +188,14 @@ impl PlateTerm {
 
     /// Returns the energy of a patch and its derivative by r, from the angles θ − θ̄ of all hinges.
     #[inline(always)]
-    fn response(&self, patch: usize, angles: &[f64]) -> (f64, [f64; 3]) {
-        let r = self.patches[patch].residual(angles);
+    pub(super) fn response<L: Level>(&self, patch: usize, angles: &[f64]) -> (f64, [f64; 3]) {
+        let r = self.patches[patch].residual::<L>(angles);
         self.frictions.get(patch).map_or_else(|| (0.5 * dot(r, r), r), |friction| friction.response(r))
     }
 
     /// Returns the energy of each patch with a free vertex.
-    fn energies<'a>(&'a self, angles: &'a [f64]) -> impl Iterator<Item = (usize, f64)> + 'a {
-        self.active.iter().map(move |&patch| (patch, self.response(patch, angles).0))
+    fn energies(&self, angles: &[f64]) -> Vec<f64> {
+        dispatch(Energies { of: self, angles, moments: None })
     }
 
     /// Evaluates θ − θ̄, ∇θ and ∂U/∂θ of all needed hinges, and notes U.
@@ -209,15 +209,8 @@ impl PlateTerm {
             flagged: 0,
         };
         for_each_batch(&self.packed, x, &mut angles);
-        let mut sum = 0.0;
-        for &patch in &self.active {
-            let (energy, stress) = self.response(patch, &angles.values);
-            sum += energy;
-            for angle in &self.patches[patch].angles {
-                angles.moments[angle.hinge] += dot(angle.b, stress);
-            }
-        }
-        self.found.store(sum.to_bits(), Relaxed);
+        let energies = dispatch(Energies { of: self, angles: &angles.values, moments: Some(&mut angles.moments) });
+        self.found.store(energies.iter().sum::<f64>().to_bits(), Relaxed);
         angles
     }
 
@@ -318,7 +311,7 @@ impl Term for PlateTerm {
         self.active =
             (0..self.patches.len()).filter(|&patch| self.patches[patch].vertices.iter().any(is_free)).collect();
         let mut needed: Vec<usize> =
-            self.active.iter().flat_map(|&patch| self.patches[patch].angles.iter().map(|angle| angle.hinge)).collect();
+            self.active.iter().flat_map(|&patch| self.patches[patch].angles.iter().map(Angle::hinge)).collect();
         needed.sort_unstable();
         needed.dedup();
         let element = ArcAngle::new();
@@ -341,7 +334,7 @@ impl PlacedTerm for PlateTerm {
         let patches: Vec<&Patch> = numbers.iter().map(|&number| &self.patches[self.active[number]]).collect();
         let stencil = |&number: &usize| self.stencils().stencil(self.active[number]);
         let mut is_needed = vec![false; self.hinges.len()];
-        patches.iter().flat_map(|patch| &patch.angles).for_each(|angle| is_needed[angle.hinge] = true);
+        patches.iter().flat_map(|patch| &patch.angles).for_each(|angle| is_needed[angle.hinge()] = true);
         let kept: Vec<usize> = (0..self.needed.len()).filter(|&number| is_needed[self.needed[number]]).collect();
         let hinges: Vec<usize> = kept.iter().map(|&number| self.needed[number]).collect();
         let mut new_index = vec![0; self.hinges.len()];
@@ -371,8 +364,7 @@ impl PlacedTerm for PlateTerm {
 
     fn energy(&self, x: &[Vector3<f64>]) -> Option<(f64, Tally)> {
         let values = self.values(x);
-        let sum = self.energies(&values.angles).map(|(_, energy)| energy).sum();
-        Some((sum, self.tally(values.flagged)))
+        Some((self.energies(&values.angles).iter().sum(), self.tally(values.flagged)))
     }
 
     fn end_step(&mut self, end: State<'_>) {
@@ -385,7 +377,9 @@ impl PlacedTerm for PlateTerm {
         }
         if !self.frictions.is_empty() {
             let angles = self.values(end.x).angles;
-            self.active.iter().for_each(|&patch| self.frictions[patch].flow(self.patches[patch].residual(&angles)));
+            self.active
+                .iter()
+                .for_each(|&patch| self.frictions[patch].flow(self.patches[patch].residual::<Baseline>(&angles)));
         }
     }
 
@@ -414,7 +408,7 @@ impl PlacedTerm for PlateTerm {
     }
 
     fn element_energies(&self, x: &[Vector3<f64>]) -> Option<Vec<(usize, f64)>> {
-        Some(self.energies(&self.values(x).angles).collect())
+        Some(self.active.iter().copied().zip(self.energies(&self.values(x).angles)).collect())
     }
 
     fn add_force(&self, state: State<'_>, force: &mut [Vector3<f64>]) -> Tally {
@@ -443,8 +437,9 @@ impl PlacedTerm for PlateTerm {
         let angles = self.angles(state.x);
         let is_finite = |patch: &Patch| {
             let finite =
-                |angle: &Angle| angles.gradients[angle.hinge].as_flattened().iter().all(|number| number.is_finite());
-            patch.residual(&angles.values).iter().all(|number| number.is_finite()) && patch.angles.iter().all(finite)
+                |angle: &Angle| angles.gradients[angle.hinge()].as_flattened().iter().all(|number| number.is_finite());
+            patch.residual::<Baseline>(&angles.values).iter().all(|number| number.is_finite())
+                && patch.angles.iter().all(finite)
         };
         self.active.iter().copied().find(|&patch| !is_finite(&self.patches[patch]))
     }
