@@ -47,13 +47,16 @@ impl PatchSlots {
         to: &mut BlocksFrom<'_, T>,
     ) {
         let (mut slots, mut left) = (&self.slots[..], multiples);
+        // LLVM would break registers into their entries, if it knew the zeros.
+        let (zero, one) = (T::from_f64(0.0), T::from_f64(1.0));
+        let diagonal = std::hint::black_box([one, zero, zero, zero, one, zero, zero, zero]);
         for (i, row) in a.iter().enumerate() {
             let (of_row, others) = slots.split_at(a.len() - i);
             let of_pairs = left.map(|all| all.split_at(of_row.len()));
             let row = Left::of(s, row);
             for (number, (&slot, right)) in of_row.iter().zip(&b[i..]).enumerate() {
                 if let Some(block) = to.block(slot) {
-                    row.add::<L>(right, of_pairs.map(|(own, _)| own[number]), block);
+                    row.add::<L>(right, of_pairs.map(|(own, _)| (own[number], &diagonal)), block);
                 }
             }
             (slots, left) = (others, of_pairs.map(|(_, others)| others));
@@ -63,7 +66,8 @@ impl PatchSlots {
         for ((pair, (i, j)), &slot) in pairs.filter(|(_, (i, j))| i != j).zip(&self.mirrored) {
             if let Some(block) = to.block(slot) {
                 let mut added = [[T::from_f64(0.0); 3]; 3];
-                Left::of(s, &a[i]).add::<L>(&b[j], multiples.map(|all| all[pair]), &mut added);
+                let multiple = multiples.map(|all| (all[pair], &diagonal));
+                Left::of(s, &a[i]).add::<L>(&b[j], multiple, &mut added);
                 for row in 0..3 {
                     (0..3).for_each(|column| block[row][column] = block[row][column] + added[column][row]);
                 }
@@ -143,9 +147,9 @@ impl<T: Precision> Left<T> {
         Self([of(&row[0]), of(&row[1]), of(&row[2])])
     }
 
-    /// A ← A + Σ aₖ bₖᵀ + m 1.
+    /// A ← A + Σ aₖ bₖᵀ + m 1, given m and the first eight entries of 1.
     #[inline(always)]
-    fn add<L: Level>(&self, Right(right): &Right<T>, multiple: Option<T>, sum: &mut Block<T>) {
+    fn add<L: Level>(&self, Right(right): &Right<T>, multiple: Option<(T, &[T; 8])>, sum: &mut Block<T>) {
         // All products come before the first sum is written.
         let numbers = sum.as_flattened_mut();
         let mut eight = [T::from_f64(0.0); 8];
@@ -157,10 +161,7 @@ impl<T: Precision> Left<T> {
         let mut ninth = self.0[0].1.mul_add::<L>(right[0].1, numbers[8]);
         ninth = self.0[1].1.mul_add::<L>(right[1].1, ninth);
         ninth = self.0[2].1.mul_add::<L>(right[2].1, ninth);
-        if let Some(multiple) = multiple {
-            // Not two sums: they would break the register into its entries.
-            let (zero, one) = (T::from_f64(0.0), T::from_f64(1.0));
-            let diagonal = [one, zero, zero, zero, one, zero, zero, zero];
+        if let Some((multiple, diagonal)) = multiple {
             for entry in 0..8 {
                 eight[entry] = multiple.mul_add::<L>(diagonal[entry], eight[entry]);
             }

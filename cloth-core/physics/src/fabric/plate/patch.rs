@@ -21,11 +21,11 @@ pub(super) struct Patch {
     unreached: Vec<[f64; 3]>,
 }
 
+/// A hinge in a patch. Sums over patches wait for these numbers: two hinges share a cache line.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Angle {
-    /// b, padded.
-    pub b: [f64; 4],
-    pub hinge: u32,
+    pub b: [f64; 3],
+    hinge: u32,
     pub local: [u8; 4],
 }
 
@@ -34,16 +34,6 @@ impl Angle {
     pub fn hinge(&self) -> usize {
         self.hinge as usize
     }
-
-    #[inline(always)]
-    pub fn b(&self) -> [f64; 3] {
-        let [x, y, z, _] = self.b;
-        [x, y, z]
-    }
-}
-
-fn padded([x, y, z]: [f64; 3]) -> [f64; 4] {
-    [x, y, z, 0.0]
 }
 
 pub(super) type Matrix = [[f64; 3]; 3];
@@ -60,9 +50,9 @@ impl Patch {
         for &(hinge, b) in &curvature.angles {
             let mut b = scaled(&b);
             unreached.iter().for_each(|q| project_out(&mut b, q));
-            angles.push(Angle { hinge: index(hinge), b: padded(b), local: [0; 4] });
+            angles.push(Angle { hinge: index(hinge), b, local: [0; 4] });
         }
-        let square = |angle: &Angle| dot(angle.b(), angle.b());
+        let square = |angle: &Angle| dot(angle.b, angle.b);
         let largest = angles.iter().map(square).fold(0.0, f64::max);
         angles.retain(|angle| square(angle) > 1e-24 * largest);
         let mut vertices: Vec<usize> = angles.iter().flat_map(|angle| hinges[angle.hinge()]).collect();
@@ -90,7 +80,7 @@ impl Patch {
         // ‖r‖² + ‖r′‖² = ‖Cᵀ r‖².
         let square = |i: usize, j: usize| IDENTITY[i][j] + dot(columns[i], columns[j]);
         let c = cholesky(&std::array::from_fn(|i| std::array::from_fn(|j| square(i, j))));
-        self.angles.iter_mut().for_each(|angle| angle.b = padded(transposed_times(&c, &angle.b())));
+        self.angles.iter_mut().for_each(|angle| angle.b = transposed_times(&c, &angle.b));
         // Columns of C⁻¹, whose product with its transpose is E.
         let inverse = IDENTITY.map(|axis| forward_substituted(&c, axis));
         let entry = |i: usize, j: usize| (0..3).map(|k| inverse[k][i] * inverse[k][j]).sum();
@@ -108,15 +98,14 @@ impl Patch {
     /// Returns r = Σ b (θ − θ̄).
     #[inline(always)]
     pub fn residual<L: Level>(&self, values: &[f64]) -> [f64; 3] {
-        let mut r = [0.0; 4];
+        let mut r = [0.0; 3];
         for angle in &self.angles {
             let value = values[angle.hinge()];
-            for k in 0..4 {
+            for k in 0..3 {
                 r[k] = Number::mul_add::<L>(angle.b[k], value, r[k]);
             }
         }
-        let [x, y, z, _] = r;
-        [x, y, z]
+        r
     }
 
     /// Appends ∇r: three vectors per vertex.
