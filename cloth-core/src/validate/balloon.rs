@@ -68,9 +68,12 @@ fn exact() -> Shape {
 /// The edge length of the discs, in m.
 const EDGE: f64 = 1e-2;
 
-/// The names of the shape's numbers.
-const QUANTITIES: [(&str, fn(&Shape) -> f64); 3] =
-    [("volume/r³", |shape| shape.volume), ("radius/r", |shape| shape.radius), ("thickness/r", |shape| shape.thickness)];
+impl Shape {
+    /// Returns the numbers with their names.
+    fn named(&self) -> [(&'static str, f64); 3] {
+        [("volume/r³", self.volume), ("radius/r", self.radius), ("thickness/r", self.thickness)]
+    }
+}
 
 /// Two discs with one rim: vertices of the upper disc, the rim, vertices of the lower disc.
 struct Discs {
@@ -165,9 +168,10 @@ pub(super) fn ask(quick: bool, report: &mut dyn FnMut(Finding)) -> Result<(), Va
     for (stiffness, limits) in [(2e3, [0.02; 3]), (2e4, [0.06, 0.02, 0.02]), (1e5, [0.14, 0.12, 0.12])] {
         let [nodal, plain] =
             [inflated(stiffness, Strain::Nodal, EDGE)?, inflated(stiffness, Strain::PerTriangle, EDGE)?];
-        for ((name, of), limit) in QUANTITIES.into_iter().zip(limits) {
-            let case = format!("balloon, {stiffness} N/m: {name} (triangles: {:.3})", of(&plain));
-            report(Finding::relative("locking", case, of(&nodal), of(&exact), limit));
+        let of_plain = plain.named();
+        for (number, (name, exact)) in exact.named().into_iter().enumerate() {
+            let case = format!("balloon, {stiffness} N/m: {name} (triangles: {:.3})", of_plain[number].1);
+            report(Finding::relative("locking", case, nodal.named()[number].1, exact, limits[number]));
         }
     }
     Ok(())
