@@ -48,7 +48,8 @@ enum Command {
     Materials,
     /// Compare simulations with exact results for strips, sheets and motions; exit status 1 if one differs too much.
     Validate(cli::validate::Validate),
-    /// Time the steps of a hanging sheet, 1 m × 1 m: implicit Euler by Newton's method, steps of 10 ms.
+    /// Time the steps of a hanging sheet, 1 m × 1 m: implicit Euler by Newton's method, steps of 10 ms. Or measure the
+    /// error of integrators, or of the steps of a scene.
     Bench(cli::bench::Bench),
     /// List the fabrics of the library, print them as tables for scene files, plot them, or read those of ARCSim.
     Fabrics(cli::fabrics::Fabrics),
@@ -75,12 +76,12 @@ fn run(command: Command) -> Result<ExitCode> {
         Command::Sweep(sweep) => return sweep.run(),
         Command::Measure(measure) => return measure.run(),
         Command::Test(test) => return test.run(),
+        Command::Bench(bench) => return bench.run(),
         Command::Report(report) => report.run(),
         Command::View(view) => view.run(),
         Command::Schema => cli::schema::run(),
         Command::Materials => cli::materials::run(),
         Command::Validate(validate) => validate.run(),
-        Command::Bench(bench) => bench.run(),
         Command::Fabrics(fabrics) => fabrics.run(),
         Command::Completions(completions) => completions.run(Arguments::command()),
         Command::Man(manual) => manual.run(Arguments::command()),

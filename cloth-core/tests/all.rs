@@ -8,6 +8,7 @@ mod drills;
 mod endings;
 mod exclusions;
 mod exported_garment;
+mod family;
 mod folders;
 mod frame_rates;
 mod hostile_folders;

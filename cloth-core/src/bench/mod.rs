@@ -1,6 +1,7 @@
 //! The benchmark: a square metre of cloth hung by two corners, on meshes of increasing resolution.
 
 mod hang;
+pub mod local_error;
 pub mod sleep;
 mod table;
 pub mod trajectory_error;

@@ -1,13 +1,17 @@
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
+use std::process::{Command, ExitCode, Stdio};
+use std::sync::atomic::Ordering;
 
 use anyhow::{Context, Result};
 use clap::{Args, ValueEnum};
 use cloth_core::bench::sleep::{self, Sizes};
-use cloth_core::bench::{self, Cloth, Measured, trajectory_error};
+use cloth_core::bench::{self, Cloth, Measured, local_error, trajectory_error};
 use cloth_core::physics::integrator::LinearSolverChoice;
+use cloth_core::scene::Scene;
+use energy_cli::Interrupts;
 use indicatif::ProgressBar;
 
+use super::allowed_folders::AllowedFolders;
 use super::{positive, print, progress_bar};
 
 #[derive(Debug, Args)]
@@ -41,17 +45,23 @@ pub struct Bench {
     #[arg(long, value_parser = positive)]
     seconds: Option<f64>,
     /// Compare integrators instead: wall time against trajectory error, for steps from 16 to 0.5 ms, or for the
-    /// largest stable steps of an explicit method.
+    /// largest stable steps of an explicit method. With a scene: its distance from a reference with a sixteenth of the
+    /// step, 0.1 s after each of six states of the reference.
     #[arg(long)]
     error: bool,
+    /// Scene file (TOML) whose local error to measure.
+    #[arg(requires = "error")]
+    scene: Option<PathBuf>,
+    #[command(flatten)]
+    allowed: AllowedFolders,
     /// Compare the time per step of sleeping or pinned vertices with that of moving ones instead.
     #[arg(long, conflicts_with = "error")]
     sleep: bool,
-    /// Print the figures as JSON instead of a table.
-    #[arg(long, conflicts_with_all = ["error", "sleep"])]
+    /// Print the figures as JSON instead of a table. With --error for a scene only.
+    #[arg(long, conflicts_with = "sleep")]
     json: bool,
-    /// With --error: output folder for the figures as CSV, Markdown and SVG.
-    #[arg(short, long, requires = "error")]
+    /// With --error and no scene: output folder for the figures as CSV, Markdown and SVG.
+    #[arg(short, long, requires = "error", conflicts_with = "scene")]
     output: Option<PathBuf>,
 }
 
@@ -62,8 +72,39 @@ enum Contact {
 }
 
 impl Bench {
-    pub fn run(&self) -> Result<()> {
+    pub fn run(&self) -> Result<ExitCode> {
+        match &self.scene {
+            Some(scene) => self.measure_local_error(scene),
+            None => self.measure_sheets().map(|()| ExitCode::SUCCESS),
+        }
+    }
+
+    /// Measures the error of a scene, on the first number of threads.
+    fn measure_local_error(&self, path: &Path) -> Result<ExitCode> {
+        let text = Scene::text(path)?;
+        self.allowed.check(&text, path)?;
+        let scene = Scene::parse(&text, path)?;
+        let interrupts = Interrupts::listen()?;
+        let progress = progress_bar(0);
+        let on_step = |done: u64, total: u64| {
+            progress.set_length(total);
+            progress.set_position(done);
+            !interrupts.flag().load(Ordering::Relaxed)
+        };
+        let threads = self.threads.first().map(|&threads| usize::from(threads));
+        let measured = local_error::measure(&scene, threads, on_step);
+        progress.finish_and_clear();
+        match measured.with_context(|| path.display().to_string())? {
+            None => return Ok(interrupts.exit_code()),
+            Some(error) if self.json => print(&format!("{}\n", serde_json::to_string(&error)?))?,
+            Some(error) => print(&local_error::table(&error))?,
+        }
+        Ok(ExitCode::SUCCESS)
+    }
+
+    fn measure_sheets(&self) -> Result<()> {
         if self.error {
+            anyhow::ensure!(!self.json, "--json with --error needs a scene");
             let cloths = if self.cloth.is_empty() { &[Cloth::Soft] } else { &*self.cloth };
             return cloths.iter().try_for_each(|&cloth| compare_integrators(cloth, self.output.as_deref()));
         }

@@ -47,6 +47,9 @@ pub struct RunScene {
     /// Repair shallow crossings at the start, as `untangle = true` does in the scene.
     #[arg(long)]
     untangle: bool,
+    /// Check each frame for crossings of cloth with itself and with obstacles, by an exact test.
+    #[arg(long)]
+    check_crossings: bool,
     /// Print what each term evaluated, skipped and reused, how much slept, and the time of each phase.
     #[arg(long)]
     stats: bool,
@@ -58,6 +61,7 @@ pub struct RunScene {
 impl RunScene {
     pub fn run(self) -> Result<ExitCode> {
         let Self { scene, output, overwrite, checkpoint, ignore_memory, stats, threads, log, mut allowed, .. } = self;
+        let check_crossings = self.check_crossings;
         let mut text = Scene::text(&scene)?;
         if let Some(file) = self.material {
             text = scene::with_material(&text, &file, &self.parameters);
@@ -75,6 +79,7 @@ impl RunScene {
         let mut options = RunOptions::default();
         (options.overwrite, options.checkpoint_interval, options.ignore_memory) =
             (overwrite, checkpoint, ignore_memory);
+        options.check_crossings = check_crossings;
         let run = Run::new(text, &scene, &output, options).map_err(|error| match error {
             RunError::Simulation(error) => anyhow::Error::new(error).context(scene.display().to_string()),
             located => located.into(),

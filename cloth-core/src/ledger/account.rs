@@ -80,7 +80,7 @@ impl Account {
     pub(crate) fn begin(&self, body: &Body, own: usize, obstacles: f64) -> Opening {
         let moves = |vertex: &usize| body.system.dofs().row(*vertex).is_none() && body.v[*vertex] != [0.0; 3];
         let moving: Vec<usize> = (0..body.x.len()).filter(moves).collect();
-        let forces = potential_forces(body, &moving).into_iter();
+        let forces = potential_forces(body, own, &moving).into_iter();
         let pins = moving.iter().zip(forces).map(|(&vertex, force)| (vertex, force, body.x[vertex])).collect();
         let x = body.system.has_contact().then(|| body.x.clone());
         let mut before = self.potential.iter().map(|(_, energy)| *energy);
@@ -117,7 +117,7 @@ impl Account {
         // Forces of cloth on cloth add up to zero. Fixed obstacles have no vertex that friction acts on.
         after.force_on_obstacles = on_cloth.iter().fold([0.0; 3], |sum, force| add_scaled(sum, -1.0, *force));
         let moving: Vec<usize> = opening.pins.iter().map(|(vertex, ..)| *vertex).collect();
-        for ((vertex, before, from), now) in opening.pins.iter().zip(potential_forces(body, &moving)) {
+        for ((vertex, before, from), now) in opening.pins.iter().zip(potential_forces(body, opening.own, &moving)) {
             let force = |axis: usize| 0.5 * (before[axis] + now[axis]) + contact[*vertex][axis];
             let work: f64 = (0..3).map(|axis| force(axis) * (body.x[*vertex][axis] - from[axis])).sum();
             *(if *vertex < opening.own { &mut after.pins } else { &mut after.obstacles }) -= work;
@@ -200,10 +200,11 @@ fn dot_of_free(body: &Body, force: &[Vector3<f64>]) -> f64 {
     body.system.dofs().free().iter().map(one).sum()
 }
 
-/// Returns the forces of the potentials, without contact, on some vertices, in N.
-fn potential_forces(body: &Body, vertices: &[usize]) -> Vec<Vector3<f64>> {
-    if vertices.is_empty() {
-        return Vec::new();
+/// Returns the forces of the potentials, without contact, on some vertices, in N. Potentials act on the first `own`
+/// vertices only; the others are those of obstacles.
+fn potential_forces(body: &Body, own: usize, vertices: &[usize]) -> Vec<Vector3<f64>> {
+    if vertices.iter().all(|&vertex| vertex >= own) {
+        return vec![[0.0; 3]; vertices.len()];
     }
     let still = vec![[0.0; 3]; body.v.len()];
     let mut force = still.clone();

@@ -30,6 +30,9 @@ pub struct Checkpoint {
     pub frames_checksum: u32,
     /// The readings of pins and garments so far.
     pub measurements: Measurements,
+    /// Whether the run checks frames for crossings.
+    #[serde(default)]
+    pub check_crossings: bool,
     /// The state of the simulation.
     pub state: SavedState,
 }

@@ -107,6 +107,8 @@ pub struct RunOptions {
     pub checkpoint_interval: Option<u64>,
     /// Whether to start even if the run seems not to fit into memory.
     pub ignore_memory: bool,
+    /// Whether to check every frame for crossings, by the exact test.
+    pub check_crossings: bool,
 }
 
 /// A simulation with its output.
@@ -125,6 +127,8 @@ pub struct Run {
     threads: usize,
     /// Steps between checkpoints; `None` for no checkpoints.
     checkpoint_interval: Option<u64>,
+    /// Whether frames are checked for crossings.
+    check_crossings: bool,
     /// The scene file and the files that it names, as they were when the run began.
     scene_file: Option<InputFile>,
     inputs: Vec<InputFile>,
@@ -148,7 +152,7 @@ impl Run {
     /// # Errors
     /// Returns an error if the scene is invalid, does not fit into memory, or the folder cannot be written to.
     pub fn new(text: String, path: &Path, output: &Path, options: RunOptions) -> Result<Self, RunError> {
-        let RunOptions { overwrite, checkpoint_interval, ignore_memory } = options;
+        let RunOptions { overwrite, checkpoint_interval, ignore_memory, check_crossings } = options;
         let scene = Scene::parse(&text, path)?;
         if !ignore_memory {
             check_memory(&scene)?;
@@ -169,6 +173,7 @@ impl Run {
             pictures: None,
             threads: available_threads(),
             checkpoint_interval,
+            check_crossings,
             scene_file: InputFile::of(path),
             inputs: inputs_of(&scene),
             notes: Vec::new(),
@@ -253,6 +258,7 @@ impl Run {
             pictures: None,
             threads: available_threads(),
             checkpoint_interval: Some(saved.every),
+            check_crossings: saved.check_crossings,
             scene_file: saved.scene_file,
             inputs: inputs_of(&scene),
             notes: Vec::new(),
@@ -357,6 +363,9 @@ impl Run {
     }
 
     fn add_frame(&mut self) -> Result<(), RunError> {
+        if self.check_crossings {
+            self.simulation.check_crossings();
+        }
         let x = self.simulation.positions();
         let forces = if self.scene.output.contact_forces { self.simulation.contact_forces() } else { Vec::new() };
         let vectors = Vectors { velocities: self.simulation.velocities().to_vec(), forces };
@@ -382,6 +391,7 @@ impl Run {
             frames: self.frames.frames().len(),
             frames_checksum: self.frames.checksum(),
             measurements: self.measurements.clone(),
+            check_crossings: self.check_crossings,
             state: self.simulation.save(),
         };
         self.folder.write_checkpoint(&checkpoint.to_bytes()?)?;

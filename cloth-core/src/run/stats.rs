@@ -6,7 +6,7 @@ use comfy_table::{CellAlignment, Table, presets};
 use energy_solve::Counts;
 
 use crate::integrator::{ContactWork, SolvedBy};
-use crate::simulation::{Summary, TermSummary};
+use crate::simulation::{Summary, TermSummary, Totals};
 
 /// Formats a table with one row per term: its elements; the values, gradients and Hessians that were evaluated or
 /// skipped, because all their vertices are pinned; and the numbers of flagged, projected and reused ones. Islands,
@@ -32,6 +32,10 @@ pub fn tables(summary: &Summary) -> String {
         count => format!("{count} times an edge crosses a triangle at the end"),
     };
     writeln!(text, "{crossings}").expect("writing to a string succeeds");
+    if let Totals { checked_frames: checked @ 1.., crossed_frames, .. } = summary.totals {
+        writeln!(text, "crossings in {crossed_frames} of {checked} checked frames")
+            .expect("writing to a string succeeds");
+    }
     if summary.obstacle_crossings > 0 {
         let count = summary.obstacle_crossings;
         writeln!(text, "{count} times cloth crosses an obstacle at the end").expect("writing to a string succeeds");

@@ -6,7 +6,7 @@ use crate::barrier::{
     BarrierContact, ContactError, Feature, FirstPush, GAP_PER_THICKNESS, LARGEST_REACH, ObstacleStart, PairFriction,
     Participants, Untangling, local_thinning,
 };
-use crate::collision::CollisionMesh;
+use crate::collision::{CollisionMesh, EDGES_PER_HEIGHT};
 use crate::contact::{AnySolid, Obstacle};
 use crate::geometry::{norm, subtract};
 use crate::model::Model;
@@ -99,10 +99,11 @@ fn note_on_thickness(kept: &[f64], thickest: f64, shortest: f64) -> String {
     let [thickest, thinned, shortest] = [thickest, least * thickest, shortest].map(millimetres);
     format!(
         "contact gives {count} of {} vertices less than their thickness, down to {thinned} mm instead of {thickest} \
-         mm: edges, the shortest of {shortest} mm, must be longer than {:.1} times the reach of contact around them. \
-         Merge vertices of short edges with `weld`, or use a coarser mesh",
+         mm: edges, the shortest of {shortest} mm, must be longer than {:.1} times the reach of contact around them, and \
+         triangles higher than {:.1} times. Merge vertices of short edges with `weld`, or use a coarser mesh",
         kept.len(),
-        1.0 / LARGEST_REACH
+        1.0 / LARGEST_REACH,
+        1.0 / LARGEST_REACH / EDGES_PER_HEIGHT
     )
 }
 

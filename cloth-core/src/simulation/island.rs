@@ -1,4 +1,5 @@
 use std::collections::BTreeMap;
+use std::time::Instant;
 
 use energy_dsl::{Element, Vector3};
 use energy_elements::WindDrag;
@@ -61,6 +62,11 @@ pub struct SavedIsland {
 }
 
 impl SavedIsland {
+    /// Forgets the history of the integrator, which depends on the size of its steps.
+    pub(super) fn forget_integrator(&mut self) {
+        self.integrator = IntegratorMemory::default();
+    }
+
     /// Forgets what depends on the way to the current positions: the history of the integrator, sleep, and how far
     /// pairs have slid. Plastic strains stay.
     pub(super) fn forget_motion(&mut self) {
@@ -208,6 +214,7 @@ impl Island {
         account: Option<&Account>,
     ) -> Result<(StepReport, Option<Account>), StepError> {
         let dt = context.dt;
+        let started = Instant::now();
         self.histories = self.body.system.histories();
         for pin in &self.moving {
             let target = context.motions[pin.motion].pose(context.end).transform(pin.initial);
@@ -222,7 +229,9 @@ impl Island {
         self.begin_step(context.time, dt)?;
         let own = self.vertices.len();
         let opening = account.map(|account| account.begin(&self.body, own, self.obstacle_power(context, false)));
-        let report = self.integrator.step(&mut self.body, dt)?;
+        let before = started.elapsed();
+        let mut report = self.integrator.step(&mut self.body, dt)?;
+        let started = Instant::now();
         check_speeds(&self.body.v[..own])?;
         let strained = account.map(|_| DrivenEnergies::of(&self.body));
         let Body { x, v, system, .. } = &mut self.body;
@@ -231,7 +240,9 @@ impl Island {
             account.after(&self.body, &opening, &strained, self.obstacle_power(context, true), dt)
         });
         self.place_obstacles(context.end);
-        Ok((report, after.transpose()?))
+        let after = after.transpose()?;
+        report.phases.add_to_ledger(before + started.elapsed());
+        Ok((report, after))
     }
 
     /// Places the vertices of obstacles at a time, with the velocities that lead them to the next time.

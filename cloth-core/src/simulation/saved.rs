@@ -50,6 +50,18 @@ impl From<SavedCounts> for Counts {
     }
 }
 
+impl SavedState {
+    /// Returns the same state for a simulation whose steps have another size, after `steps` of them. It has no ledger,
+    /// its totals begin at 0, and integrators forget their history.
+    #[must_use]
+    pub fn after_other_steps(mut self, steps: u64) -> Self {
+        self.totals = Totals { steps, ..Totals::default() };
+        self.ledger = None;
+        self.islands.iter_mut().for_each(SavedIsland::forget_integrator);
+        self
+    }
+}
+
 /// Serialises optional [`Counts`] as [`SavedCounts`], for `#[serde(with)]`.
 pub(super) mod saved_counts {
     use super::{Counts, SavedCounts};

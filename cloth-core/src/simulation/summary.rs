@@ -105,14 +105,18 @@ impl Summary {
 
     /// The phases of a step, in order, with the total time of each.
     #[must_use]
-    pub fn named_phases(&self) -> [(&'static str, Duration); 5] {
+    pub fn named_phases(&self) -> [(&'static str, Duration); 8] {
         let Phases { assembly, factorisation, solve, line_search, collision, .. } = self.totals.phases;
+        let Phases { contact, preparation, ledger, .. } = self.totals.phases;
         [
             ("assembly", assembly),
             ("factorisation", factorisation),
             ("linear solves", solve),
             ("line search", line_search),
             ("collision", collision),
+            ("contact", contact),
+            ("preparation", preparation),
+            ("ledger", ledger),
         ]
     }
 
@@ -240,6 +244,9 @@ impl Simulation {
                 self.cause_of_obstacle_crossings()
             ));
         }
+        if let Totals { crossed_frames: crossed @ 1.., checked_frames, .. } = summary.totals {
+            summary.warnings.push(format!("there are crossings in {crossed} of {checked_frames} checked frames"));
+        }
         summary.warnings.extend(summary.totals.passages.iter().map(ToString::to_string));
         let Some(ledger) = &self.ledger else { return };
         let integrator = &summary.integrator;
@@ -272,7 +279,7 @@ impl fmt::Display for Summary {
             writeln!(f, "{note}")?;
         }
         let Totals { steps, solves, solved_by, iterations, projected, rejected, stepping_time, .. } = &self.totals;
-        let Totals { local_solves, local_vertices, .. } = &self.totals;
+        let Totals { local_solves, local_vertices, energies, .. } = &self.totals;
         let simulated = *steps as f64 * self.dt;
         writeln!(f, "{}: {steps} steps of {} s = {simulated:.3} s", self.integrator, self.dt)?;
         if let Some(dt) = self.shortened_from {
@@ -290,6 +297,9 @@ impl fmt::Display for Summary {
             }
             if *solved_by != SolvedBy::default() {
                 writeln!(f, "by {solved_by}")?;
+            }
+            if *energies > 0 {
+                writeln!(f, "{energies} evaluations of the energy along search directions")?;
             }
             writeln!(f, "{projected} steps with projected Hessians")?;
         }

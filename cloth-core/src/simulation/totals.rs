@@ -24,6 +24,12 @@ pub struct Totals {
     pub solved_by: SolvedBy,
     /// Iterations of the linear solver.
     pub iterations: u64,
+    /// Evaluations of the energy of all vertices; see [`crate::integrator::Newton`].
+    #[serde(default)]
+    pub energies: u64,
+    /// Halvings by the line search of Newton's method.
+    #[serde(default)]
+    pub halvings: u64,
     /// Steps that needed Hessians projected to positive semi-definite; see [`crate::integrator::Newton`].
     pub projected: u64,
     /// Steps rejected and retried with a smaller step size; see [`crate::integrator::Adaptive`].
@@ -34,6 +40,12 @@ pub struct Totals {
     /// The work of certified contact.
     #[serde(default)]
     pub contact: ContactWork,
+    /// Frames that were checked for crossings.
+    #[serde(default)]
+    pub checked_frames: u64,
+    /// Frames of these in which cloth or hair crosses itself or an obstacle.
+    #[serde(default)]
+    pub crossed_frames: u64,
     /// Vertices that passed through obstacles, one entry for each obstacle that any passed through.
     #[serde(default)]
     pub passages: Vec<Passage>,
@@ -61,6 +73,8 @@ impl Totals {
         self.solved_by += report.solved_by;
         self.iterations += report.iterations;
         self.projected += u64::from(report.projected);
+        self.energies += report.energies;
+        self.halvings += report.halvings;
         self.rejected += report.rejected;
         self.slept += slept;
         self.contact += report.contact;

@@ -3,6 +3,7 @@
 //! One file per question. Static shapes are computed by Newton's method on the energy, with a direct solver; motions
 //! are simulated.
 
+mod balloon;
 mod cantilever;
 mod capstan;
 mod catenary;
@@ -13,6 +14,7 @@ mod elastica;
 mod equilibrium;
 mod fold;
 mod hanging_strip;
+mod held;
 mod impacts;
 mod knots;
 mod lateral_buckling;

@@ -166,6 +166,23 @@ mod tests {
         }
     }
 
+    /// A vertex 1.2 mm from an edge of 100 mm, with long edges only.
+    #[test]
+    fn a_low_triangle_thins_the_cloth_around_it() {
+        let x = vec![[0.0; 3], [0.1, 0.0, 0.0], [0.05, 1.2e-3, 0.0], [0.05, -0.1, 0.0], [0.3, -0.4, 0.0]];
+        let mesh = CollisionMesh::new(5, &[[0, 1, 2], [1, 0, 3], [1, 3, 4]], &[], &[]);
+        let thickest = 1e-3;
+        let kept = local_thinning(&mesh, &x, thickest);
+        for (vertex, part) in kept.iter().enumerate() {
+            let reach = 3.0 * thickest * part;
+            assert!(if vertex < 3 { reach < 0.61 * 1.2e-3 } else { reach > 2e-3 }, "{vertex}: {reach}");
+        }
+        // The triangles of a grid are as high as their edges ask for.
+        let grid = CollisionMesh::new(4, &[[0, 1, 3], [0, 3, 2]], &[], &[]);
+        let square = [[0.0; 3], [1e-3, 0.0, 0.0], [0.0, 1e-3, 0.0], [1e-3, 1e-3, 0.0]];
+        assert_eq!(local_thinning(&grid, &square, thickest), [thinning(thickest, 1e-3); 4]);
+    }
+
     #[test]
     fn a_pair_is_as_thick_as_the_thinnest_vertices_of_its_features() {
         use crate::collision::PairKind;

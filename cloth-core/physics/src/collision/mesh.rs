@@ -4,7 +4,10 @@ use energy_dsl::Vector3;
 use energy_solve::index;
 
 use super::{Core, Pair, PairKind};
-use crate::geometry::{Bounds, norm, subtract};
+use crate::geometry::{Bounds, cross, norm, subtract};
+
+/// A triangle is as narrow as an edge of this multiple of its height.
+pub const EDGES_PER_HEIGHT: f64 = 1.5;
 
 /// The points, edges and triangles of cloth and hair that can collide, and those of obstacles after them.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -160,7 +163,8 @@ impl CollisionMesh {
     }
 
     /// Returns, for each vertex, the length of the shortest edge of cloth and hair that it or a triangle with it has at
-    /// x, in m; infinity for a vertex without edges.
+    /// x, in m; infinity for a vertex without edges. A triangle that is lower than two thirds of its edges counts by
+    /// 1.5 times its height: its apex is that close to the triangle beyond.
     #[must_use]
     pub(crate) fn shortest_edges(&self, x: &[Vector3<f64>]) -> Vec<f64> {
         let mut shortest = vec![f64::INFINITY; self.vertices()];
@@ -169,8 +173,13 @@ impl CollisionMesh {
             *known = known.min(length);
         };
         for (number, &[a, b]) in self.own_edges().iter().enumerate() {
-            let length = norm(subtract(x[a as usize], x[b as usize]));
+            let along = subtract(x[b as usize], x[a as usize]);
+            let length = norm(along);
             [a, b].iter().chain(self.apexes(number)).for_each(|&vertex| note(vertex, length));
+            for &apex in self.apexes(number) {
+                let height = norm(cross(along, subtract(x[apex as usize], x[a as usize]))) / length;
+                [a, b, apex].into_iter().for_each(|vertex| note(vertex, EDGES_PER_HEIGHT * height));
+            }
         }
         shortest
     }

@@ -38,7 +38,7 @@ pub use closest::Closest;
 pub use crossing::{Crossing, crossings};
 pub use exclusions::{Exclusions, Members};
 pub use measured::{Measured, MeasuredPart};
-pub use mesh::CollisionMesh;
+pub use mesh::{CollisionMesh, EDGES_PER_HEIGHT};
 pub use moving_balls::MovingBalls;
 pub use neighbourhood::Neighbourhood;
 pub use pair::{Pair, PairKind};

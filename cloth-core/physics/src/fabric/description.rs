@@ -144,6 +144,13 @@ pub struct Hysteresis {
     pub curvature: f64,
 }
 
+impl Hysteresis {
+    /// Returns the rigidity of the plate that yields.
+    pub(super) fn rigidity(&self) -> Rigidity {
+        Rigidity::Flexural { rigidity: self.moment / self.curvature, poisson_ratio: 0.0 }
+    }
+}
+
 fn yield_curvature() -> f64 {
     20.0
 }

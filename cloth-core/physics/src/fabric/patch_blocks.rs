@@ -1,6 +1,6 @@
 //! Sums of outer products over patches of vertices, with the blocks of a matrix to which they are added.
 
-use energy_dsl::Block;
+use energy_dsl::{Block, Level};
 use energy_solve::{DofMap, Pattern, Precision, Restriction, Storage, index};
 
 /// Slots of the blocks of a patch: of the pairs i ≤ j, and of the mirrored pairs if the matrix stores both triangles.
@@ -37,25 +37,55 @@ impl PatchSlots {
         Self { vertices: self.vertices, slots: slots(&self.slots), mirrored: slots(&self.mirrored) }
     }
 
-    /// Adds Σ aᵢₖ bⱼₖᵀ + m 1 to the block of each pair, given the factors of the vertices and, by pairs i ≤ j, the
+    /// Adds s Σ aᵢₖ bⱼₖᵀ + m 1 to the block of each pair, given the rows a and b of the vertices and, by pairs i ≤ j, the
     /// multiples m of the identity; no multiples stand for zeros.
     #[inline(always)]
-    pub fn add<T: Precision>(&self, factors: &[[Factors<T>; 3]], multiples: Option<&[T]>, matrix: &mut [Block<T>]) {
-        let (mut slots, mut mirrored) = (self.slots.iter(), self.mirrored.iter());
-        let mut pair = 0;
-        for i in 0..factors.len() {
-            for j in i..factors.len() {
-                let Some(&slot) = slots.next() else { return };
-                let multiple = multiples.map(|all| all[pair]);
-                add_outer_product(&mut matrix[slot as usize], &factors[i], &factors[j], multiple);
-                if i != j
-                    && let Some(&slot) = mirrored.next()
-                {
-                    add_outer_product(&mut matrix[slot as usize], &factors[j], &factors[i], multiple);
+    pub fn add<L: Level, T: Precision>(
+        &self,
+        (s, a, b): (T, &[Row<T>], &[Right<T>]),
+        multiples: Option<&[T]>,
+        to: &mut BlocksFrom<'_, T>,
+    ) {
+        let (mut slots, mut left) = (&self.slots[..], multiples);
+        // LLVM would break registers into their entries, if it knew the zeros.
+        let (zero, one) = (T::from_f64(0.0), T::from_f64(1.0));
+        let diagonal = std::hint::black_box([one, zero, zero, zero, one, zero, zero, zero]);
+        for (i, row) in a.iter().enumerate() {
+            let (of_row, others) = slots.split_at(a.len() - i);
+            let of_pairs = left.map(|all| all.split_at(of_row.len()));
+            let row = Left::of(s, row);
+            for (number, (&slot, right)) in of_row.iter().zip(&b[i..]).enumerate() {
+                if let Some(block) = to.block(slot) {
+                    row.add::<L>(right, of_pairs.map(|(own, _)| (own[number], &diagonal)), block);
                 }
-                pair += 1;
+            }
+            (slots, left) = (others, of_pairs.map(|(_, others)| others));
+        }
+        // The mirrored block is the transposed one.
+        let pairs = (0..a.len()).flat_map(|i| (i..a.len()).map(move |j| (i, j))).enumerate();
+        for ((pair, (i, j)), &slot) in pairs.filter(|(_, (i, j))| i != j).zip(&self.mirrored) {
+            if let Some(block) = to.block(slot) {
+                let mut added = [[T::from_f64(0.0); 3]; 3];
+                let multiple = multiples.map(|all| (all[pair], &diagonal));
+                Left::of(s, &a[i]).add::<L>(&b[j], multiple, &mut added);
+                for row in 0..3 {
+                    (0..3).for_each(|column| block[row][column] = block[row][column] + added[column][row]);
+                }
             }
         }
+    }
+}
+
+/// Blocks of a matrix from block `first` on. Others are left out.
+pub(super) struct BlocksFrom<'a, T> {
+    pub first: usize,
+    pub blocks: &'a mut [Block<T>],
+}
+
+impl<T> BlocksFrom<'_, T> {
+    #[inline(always)]
+    fn block(&mut self, slot: u32) -> Option<&mut Block<T>> {
+        self.blocks.get_mut((slot as usize).wrapping_sub(self.first))
     }
 }
 
@@ -72,47 +102,72 @@ pub(super) fn padded_stencils<'a>(patches: impl Iterator<Item = &'a [usize]> + C
 /// Three vectors, each padded to four components.
 pub(super) type Row<T> = [[T; 4]; 3];
 
-/// Two vectors a and b as the factors of a block, by entries: the first eight are added in one register.
-#[derive(Clone, Copy)]
-pub(super) struct Factors<T> {
-    /// a, each component three times.
-    left: [T; 8],
-    /// b, repeated.
-    right: [T; 8],
-    /// The factors of the last entry.
-    last: [T; 2],
+/// Converts vectors to another precision. Loops, as in all that kernels call: the closures of `array::map` are compiled
+/// without the instructions of the kernel.
+#[inline(always)]
+pub(super) fn converted<T: Precision, const N: usize>(vectors: &[[f64; 4]; N]) -> [[T; 4]; N] {
+    let mut converted = [[T::from_f64(0.0); 4]; N];
+    for (vector, number) in converted.iter_mut().zip(vectors) {
+        for axis in 0..4 {
+            vector[axis] = T::from_f64(number[axis]);
+        }
+    }
+    converted
 }
 
-impl<T: Precision> Factors<T> {
+/// Three vectors b as the right factors of blocks: each repeated, as the first eight entries need it, and its last
+/// component.
+#[derive(Clone, Copy)]
+pub(super) struct Right<T>([([T; 8], T); 3]);
+
+impl<T: Precision> Right<T> {
     #[inline(always)]
-    pub fn new(&[x, y, z, _]: &[T; 4], &[a, b, c, _]: &[T; 4]) -> Self {
-        Self { left: [x, x, x, y, y, y, z, z], right: [a, b, c, a, b, c, a, b], last: [z, c] }
+    pub fn of(row: &Row<T>) -> Self {
+        let of = |&[a, b, c, _]: &[T; 4]| ([a, b, c, a, b, c, a, b], c);
+        Self([of(&row[0]), of(&row[1]), of(&row[2])])
     }
 
     /// Returns zeros, to be overwritten.
     pub fn zeros() -> Self {
-        let zero = [T::from_f64(0.0); 4];
-        Self::new(&zero, &zero)
+        Self::of(&[[T::from_f64(0.0); 4]; 3])
     }
 }
 
-/// A ← A + Σ aₖ bₖᵀ + m 1.
-#[inline(always)]
-fn add_outer_product<T: Precision>(sum: &mut Block<T>, a: &[Factors<T>; 3], b: &[Factors<T>; 3], multiple: Option<T>) {
-    // All products come before the first sum is written: the compiler cannot tell that A is apart from the factors.
-    let product = |k: usize, entry: usize| a[k].left[entry] * b[k].right[entry];
-    let last = |k: usize| a[k].last[0] * b[k].last[1];
-    let mut eight = [T::from_f64(0.0); 8];
-    for entry in 0..8 {
-        eight[entry] = product(0, entry) + product(1, entry) + product(2, entry);
+/// The left factors of a row of blocks, each component three times. In a copy of its own, the compiler keeps them in
+/// registers: it cannot tell that the blocks are apart from what they come from.
+struct Left<T>([([T; 8], T); 3]);
+
+impl<T: Precision> Left<T> {
+    #[inline(always)]
+    fn of(s: T, row: &Row<T>) -> Self {
+        let of = |&[x, y, z, _]: &[T; 4]| {
+            let (x, y, z) = (s * x, s * y, s * z);
+            ([x, x, x, y, y, y, z, z], z)
+        };
+        Self([of(&row[0]), of(&row[1]), of(&row[2])])
     }
-    let mut ninth = last(0) + last(1) + last(2);
-    if let Some(multiple) = multiple {
-        (eight[0], eight[4], ninth) = (eight[0] + multiple, eight[4] + multiple, ninth + multiple);
+
+    /// A ← A + Σ aₖ bₖᵀ + m 1, given m and the first eight entries of 1.
+    #[inline(always)]
+    fn add<L: Level>(&self, Right(right): &Right<T>, multiple: Option<(T, &[T; 8])>, sum: &mut Block<T>) {
+        // All products come before the first sum is written.
+        let numbers = sum.as_flattened_mut();
+        let mut eight = [T::from_f64(0.0); 8];
+        for entry in 0..8 {
+            let mut product = self.0[0].0[entry].mul_add::<L>(right[0].0[entry], numbers[entry]);
+            product = self.0[1].0[entry].mul_add::<L>(right[1].0[entry], product);
+            eight[entry] = self.0[2].0[entry].mul_add::<L>(right[2].0[entry], product);
+        }
+        let mut ninth = self.0[0].1.mul_add::<L>(right[0].1, numbers[8]);
+        ninth = self.0[1].1.mul_add::<L>(right[1].1, ninth);
+        ninth = self.0[2].1.mul_add::<L>(right[2].1, ninth);
+        if let Some((multiple, diagonal)) = multiple {
+            for entry in 0..8 {
+                eight[entry] = multiple.mul_add::<L>(diagonal[entry], eight[entry]);
+            }
+            ninth = ninth + multiple;
+        }
+        numbers[..8].copy_from_slice(&eight);
+        numbers[8] = ninth;
     }
-    let sum = sum.as_flattened_mut();
-    for entry in 0..8 {
-        sum[entry] = sum[entry] + eight[entry];
-    }
-    sum[8] = sum[8] + ninth;
 }

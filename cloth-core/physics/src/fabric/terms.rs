@@ -137,9 +137,9 @@ pub fn terms_at(
         terms.add_strain_limit(limit, &cloth)?;
     }
     if let Some(bending) = bending {
-        terms.add_bending(bending, &cloth)?;
+        terms.add_bending(bending, fabric.hysteresis.as_ref(), &cloth)?;
     }
-    if let Some(hysteresis) = &fabric.hysteresis {
+    if let Some(hysteresis) = fabric.hysteresis.as_ref().filter(|_| !bending.is_some_and(is_plate)) {
         terms.add_hysteresis(hysteresis, &cloth)?;
     }
     if let Some(rayleigh) = &fabric.rayleigh {
@@ -157,6 +157,11 @@ fn check_plasticity(fabric: &Fabric) -> Result<(), FabricError> {
     }
     let can_fold = matches!(fabric.material.bending(), Some(Bending::Plate(_) | Bending::Bridson { .. }));
     if curvature.is_some() && !can_fold { Err(FabricError::CannotFold) } else { Ok(()) }
+}
+
+/// Whether bending is that of a plate with a rigidity, which hysteresis joins.
+fn is_plate(bending: &Bending) -> bool {
+    matches!(bending, Bending::Plate(rigidity) if rigidity.matrix().is_ok_and(|d| d[0][0] > 0.0))
 }
 
 pub(super) fn area([a, b, c]: MaterialTriangle) -> f64 {
@@ -289,19 +294,36 @@ impl FabricTerms {
         Ok(())
     }
 
-    fn add_bending(&mut self, bending: &Bending, cloth: &MaterialMesh<'_>) -> Result<(), FabricError> {
+    fn add_plate(
+        &mut self,
+        rigidity: &Rigidity,
+        hysteresis: Option<&Hysteresis>,
+        cloth: &MaterialMesh<'_>,
+    ) -> Result<(), FabricError> {
+        let is_zero = !is_plate(&Bending::Plate(*rigidity));
+        let mut plate = PlateTerm::new(self.named("bending"), cloth.mesh, rigidity, cloth.warp)?;
+        if self.leave_out("bending", is_zero, plate.triangles()) {
+            return Ok(());
+        }
+        if let Some(curvature) = cloth.plasticity.curvature {
+            plate = plate.yielding(cloth.mesh, curvature);
+        }
+        if let Some(hysteresis) = hysteresis {
+            plate = plate.with_friction(&hysteresis.rigidity(), hysteresis.moment)?;
+        }
+        self.terms.push(Box::new(plate.on_vertices_from(self.part.first)));
+        Ok(())
+    }
+
+    fn add_bending(
+        &mut self,
+        bending: &Bending,
+        hysteresis: Option<&Hysteresis>,
+        cloth: &MaterialMesh<'_>,
+    ) -> Result<(), FabricError> {
         let mesh = cloth.mesh;
         if let Bending::Plate(rigidity) = bending {
-            let is_zero = rigidity_along_grid(bending)? == 0.0;
-            let plate = PlateTerm::new(self.named("bending"), mesh, rigidity, cloth.warp)?;
-            let plate = match cloth.plasticity.curvature {
-                Some(curvature) => plate.yielding(mesh, curvature),
-                None => plate,
-            };
-            if !self.leave_out("bending", is_zero, plate.triangles()) {
-                self.terms.push(Box::new(plate.on_vertices_from(self.part.first)));
-            }
-            return Ok(());
+            return self.add_plate(rigidity, hysteresis, cloth);
         }
         let hinges = Topology::of(mesh).hinges;
         let stencils: Vec<[usize; 4]> = hinges.iter().map(|hinge| hinge.vertices).collect();
@@ -353,11 +375,10 @@ impl FabricTerms {
     }
 
     fn add_hysteresis(&mut self, hysteresis: &Hysteresis, cloth: &MaterialMesh<'_>) -> Result<(), FabricError> {
-        let Hysteresis { moment, curvature } = *hysteresis;
-        let rigidity = Rigidity::Flexural { rigidity: moment / curvature, poisson_ratio: 0.0 };
-        let plate = PlateTerm::new(self.named("bending hysteresis"), cloth.mesh, &rigidity, cloth.warp)?;
+        let name = self.named("bending hysteresis");
+        let plate = PlateTerm::new(name, cloth.mesh, &hysteresis.rigidity(), cloth.warp)?;
         if !self.leave_out("bending hysteresis", false, plate.triangles()) {
-            let plate = plate.with_plastic_curvature(moment);
+            let plate = plate.with_plastic_curvature(hysteresis.moment);
             self.terms.push(Box::new(plate.on_vertices_from(self.part.first)));
         }
         Ok(())

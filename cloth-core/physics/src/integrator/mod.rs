@@ -107,6 +107,9 @@ pub struct StepReport {
     pub iterations: u64,
     /// Whether an indefinite system made the step use projected Hessians; see [`ImplicitEuler`] and [`Newton`].
     pub projected: bool,
+    /// Evaluations of the energy of all vertices by [`Newton`].
+    #[serde(default)]
+    pub energies: u64,
     /// Halvings by the line search of Newton's method.
     pub halvings: u64,
     /// Steps rejected and retried with a smaller size; see [`Adaptive`].
@@ -125,6 +128,7 @@ impl std::ops::AddAssign for StepReport {
         self.solved_by += other.solved_by;
         self.iterations += other.iterations;
         self.projected |= other.projected;
+        self.energies += other.energies;
         self.halvings += other.halvings;
         self.rejected += other.rejected;
         self.contact += other.contact;

@@ -90,6 +90,16 @@ pub struct Tolerances {
 }
 
 impl Tolerances {
+    /// Returns tolerances with `factor` times the velocity at which a step of this scheme converges, and ten times the
+    /// iterations.
+    #[must_use]
+    pub fn tightened(self, scheme: Scheme, factor: f64) -> Self {
+        let first_order = matches!(scheme, Scheme::Newton);
+        let default = if first_order { NewtonOptions::default() } else { second_order_tolerances() };
+        let NewtonOptions { velocity_tolerance, iteration_limit, .. } = self.applied(default);
+        Self { velocity: Some(factor * velocity_tolerance), iterations: Some(10 * iteration_limit), ..self }
+    }
+
     fn applied(self, default: NewtonOptions) -> NewtonOptions {
         NewtonOptions {
             velocity_tolerance: self.velocity.unwrap_or(default.velocity_tolerance),

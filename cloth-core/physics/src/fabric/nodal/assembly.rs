@@ -6,12 +6,14 @@ use energy_solve::{Curvature, Precision, State, change_dense};
 use super::law::{Response, Strain};
 use super::symmetric::with_eigenvalues;
 use super::term::NodalMembrane;
-use crate::fabric::patch_blocks::{Factors, GROUP, Row};
+use crate::fabric::patch_blocks::{BlocksFrom, GROUP, Right, Row, converted};
 use crate::geometry::dot;
 
-/// Returns the mean strains of the active patches.
+/// Returns the mean strains of patches.
 pub(super) struct Strains<'a> {
     pub of: &'a NodalMembrane,
+    /// Indices of the patches.
+    pub patches: &'a [usize],
     pub x: &'a [Vector3<f64>],
 }
 
@@ -20,20 +22,30 @@ impl Kernel for Strains<'_> {
 
     #[inline(always)]
     fn run<L: Level>(self) -> Vec<Strain> {
-        let mut strains = vec![[0.0; 3]; self.of.active.len()];
-        for (strain, &patch) in strains.iter_mut().zip(&self.of.active) {
+        let mut strains = vec![[0.0; 3]; self.patches.len()];
+        for (strain, &patch) in strains.iter_mut().zip(self.patches) {
             *strain = self.of.patches[patch].strain(self.x);
         }
         strains
     }
 }
 
+/// A patch among the active ones, and its response.
+pub(super) type Found = (usize, Response);
+
+/// Consecutive vertices of a sum.
+pub(super) struct Sums<'a> {
+    /// The first vertex.
+    pub first: usize,
+    pub vectors: &'a mut [Vector3<f64>],
+}
+
 /// Subtracts Σ S : ∂Ē/∂x.
 pub(super) struct Forces<'a> {
     pub of: &'a NodalMembrane,
-    pub responses: &'a [Response],
+    pub found: &'a [Found],
     pub x: &'a [Vector3<f64>],
-    pub force: &'a mut [Vector3<f64>],
+    pub force: Sums<'a>,
 }
 
 impl Kernel for Forces<'_> {
@@ -41,21 +53,21 @@ impl Kernel for Forces<'_> {
 
     #[inline(always)]
     fn run<L: Level>(self) {
-        let Self { of, responses, x, force } = self;
+        let Self { of, found, x, mut force } = self;
         let mut rows = Vec::new();
-        for (&patch, response) in of.active.iter().zip(responses) {
-            let patch = &of.patches[patch];
+        for (number, response) in found {
+            let patch = &of.patches[of.active[*number]];
             rows.clear();
             patch.append_gradients(x, &mut rows);
-            subtract_gradient(&rows, &patch.vertices, &response.stress, force);
+            subtract_gradient(&rows, &patch.vertices, &response.stress, &mut force);
         }
     }
 }
 
 #[inline(always)]
-fn subtract_gradient(rows: &[Row<f64>], vertices: &[usize], stress: &Strain, force: &mut [Vector3<f64>]) {
+fn subtract_gradient(rows: &[Row<f64>], vertices: &[usize], stress: &Strain, sums: &mut Sums<'_>) {
     for (row, &vertex) in rows.iter().zip(vertices) {
-        let force = &mut force[vertex];
+        let Some(force) = sums.vectors.get_mut(vertex.wrapping_sub(sums.first)) else { continue };
         for axis in 0..3 {
             force[axis] -= stress[0] * row[0][axis] + stress[1] * row[1][axis] + stress[2] * row[2][axis];
         }
@@ -65,11 +77,13 @@ fn subtract_gradient(rows: &[Row<f64>], vertices: &[usize], stress: &Strain, for
 /// Subtracts Σ S : ∂Ē/∂x, and adds `scale` times the Hessian, Σ ∂Ē/∂xᵀ (∂S/∂E) ∂Ē/∂x + S : ∂²Ē/∂x².
 pub(super) struct Hessians<'a, T> {
     pub of: &'a NodalMembrane,
-    pub responses: &'a [Response],
+    pub found: &'a [Found],
     pub x: &'a [Vector3<f64>],
     pub scale: f64,
     pub curvature: Curvature,
-    pub force: &'a mut [Vector3<f64>],
+    pub force: Sums<'a>,
+    /// The first block of the matrix.
+    pub first: usize,
     pub matrix: &'a mut [Block<T>],
 }
 
@@ -78,54 +92,60 @@ impl<T: Precision> Kernel for Hessians<'_, T> {
 
     #[inline(always)]
     fn run<L: Level>(self) {
-        let Self { of, responses, x, scale, curvature, force, matrix } = self;
-        let (mut rows, mut factors) = (Vec::<Row<f64>>::new(), Vec::<[Factors<T>; 3]>::new());
+        let Self { of, found, x, scale, curvature, mut force, first, matrix } = self;
+        let mut to = BlocksFrom { first, blocks: matrix };
+        let (mut rows, mut lefts, mut rights) = (Vec::<Row<f64>>::new(), Vec::<Row<T>>::new(), Vec::<Right<T>>::new());
         let mut multiples = Vec::<T>::new();
-        let groups = of.active.chunks(GROUP).zip(responses.chunks(GROUP)).zip(of.slots.chunks(GROUP));
-        for ((patches, responses), slots) in groups {
+        for group in found.chunks(GROUP) {
             rows.clear();
             multiples.clear();
-            patches.iter().for_each(|&patch| of.patches[patch].append_gradients(x, &mut rows));
-            factors.resize(rows.len(), [Factors::zeros(); 3]);
+            group.iter().for_each(|(number, _)| of.patches[of.active[*number]].append_gradients(x, &mut rows));
+            lefts.resize(rows.len(), [[T::from_f64(0.0); 4]; 3]);
+            rights.resize(rows.len(), Right::zeros());
             let mut first = 0;
-            for (&patch, response) in patches.iter().zip(responses) {
-                let patch = &of.patches[patch];
+            for (number, response) in group {
+                let patch = &of.patches[of.active[*number]];
                 let own = first..first + patch.vertices.len();
                 first = own.end;
-                subtract_gradient(&rows[own.clone()], &patch.vertices, &response.stress, force);
+                subtract_gradient(&rows[own.clone()], &patch.vertices, &response.stress, &mut force);
                 let (moduli, stress) = match curvature {
                     Curvature::Exact => (response.moduli, response.stress),
                     _ => changed(response, curvature),
                 };
-                patch.append_stress_stiffness(&stress.map(|component| scale * component), &mut multiples);
-                for (factors, row) in factors[own.clone()].iter_mut().zip(&rows[own]) {
+                let [uu, vv, uv] = stress;
+                patch.append_stress_stiffness(&[scale * uu, scale * vv, scale * uv], &mut multiples);
+                for ((left, right), row) in lefts[own.clone()].iter_mut().zip(&mut rights[own.clone()]).zip(&rows[own])
+                {
+                    *left = converted(row);
                     // `black_box` keeps LLVM from vectorising this loop with scatters.
-                    write_factors(std::hint::black_box(factors), row, &moduli, scale);
+                    *std::hint::black_box(right) = Right::of(&times::<L, T>(&moduli, left));
                 }
             }
-            let (mut left, mut multiples) = (&factors[..], &multiples[..]);
-            for slots in slots {
-                let (own, others) = left.split_at(slots.vertices);
+            let (mut first, mut multiples) = (0, &multiples[..]);
+            for (number, _) in group {
+                let slots = &of.slots[*number];
+                let own = first..first + slots.vertices;
+                first = own.end;
                 let (of_pairs, of_others) = multiples.split_at(slots.vertices * (slots.vertices + 1) / 2);
-                slots.add(own, Some(of_pairs), matrix);
-                (left, multiples) = (others, of_others);
+                let factors = (T::from_f64(scale), &lefts[own.clone()], &rights[own]);
+                slots.add::<L, T>(factors, Some(of_pairs), &mut to);
+                multiples = of_others;
             }
         }
     }
 }
 
-/// Writes the factors of `scale` ∂Ē/∂x and (∂S/∂E) ∂Ē/∂x of a vertex.
+/// Returns (∂S/∂E) ∂Ē/∂x of a vertex.
 #[inline(always)]
-fn write_factors<T: Precision>(factors: &mut [Factors<T>; 3], row: &Row<f64>, moduli: &[[f64; 3]; 3], scale: f64) {
+fn times<L: Level, T: Precision>(moduli: &[[f64; 3]; 3], row: &Row<T>) -> Row<T> {
+    let mut product = [[T::from_f64(0.0); 4]; 3];
     for k in 0..3 {
-        let (mut left, mut right) = ([T::from_f64(0.0); 4], [T::from_f64(0.0); 4]);
+        let [a, b, c] = [T::from_f64(moduli[k][0]), T::from_f64(moduli[k][1]), T::from_f64(moduli[k][2])];
         for axis in 0..4 {
-            left[axis] = T::from_f64(scale * row[k][axis]);
-            let [a, b, c] = [row[0][axis], row[1][axis], row[2][axis]];
-            right[axis] = T::from_f64(moduli[k][0] * a + moduli[k][1] * b + moduli[k][2] * c);
+            product[k][axis] = c.mul_add::<L>(row[2][axis], b.mul_add::<L>(row[1][axis], a * row[0][axis]));
         }
-        factors[k] = Factors::new(&left, &right);
     }
+    product
 }
 
 /// Returns moduli and stress with eigenvalues treated as `curvature` says. Either part of the Hessian is then positive
@@ -152,24 +172,19 @@ fn is_definite(&[[a, b, c], [_, d, e], [_, _, f]]: &[[f64; 3]; 3]) -> bool {
 }
 
 /// Subtracts the product of the exact Hessian with the velocities.
-pub(super) fn subtract_product(
-    of: &NodalMembrane,
-    responses: &[Response],
-    state: State<'_>,
-    product: &mut [Vector3<f64>],
-) {
+pub(super) fn subtract_product(of: &NodalMembrane, found: &[Found], state: State<'_>, mut product: Sums<'_>) {
     let mut rows = Vec::new();
-    for (&patch, response) in of.active.iter().zip(responses) {
-        let patch = &of.patches[patch];
+    for (number, response) in found {
+        let patch = &of.patches[of.active[*number]];
         rows.clear();
         patch.append_gradients(state.x, &mut rows);
         let moved = |(row, &vertex): (&Row<f64>, &usize)| row.map(|[x, y, z, _]| dot([x, y, z], state.v[vertex]));
         let rates = rows.iter().zip(&patch.vertices).map(moved);
         let rate = rates.fold([0.0; 3], |sum: [f64; 3], one| std::array::from_fn(|k| sum[k] + one[k]));
-        subtract_gradient(&rows, &patch.vertices, &response.moduli.map(|row| dot(row, rate)), product);
+        subtract_gradient(&rows, &patch.vertices, &response.moduli.map(|row| dot(row, rate)), &mut product);
         // The second part has the form of a gradient, at the velocities.
         rows.clear();
         patch.append_gradients(state.v, &mut rows);
-        subtract_gradient(&rows, &patch.vertices, &response.stress, product);
+        subtract_gradient(&rows, &patch.vertices, &response.stress, &mut product);
     }
 }

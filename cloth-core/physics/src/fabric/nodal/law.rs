@@ -41,10 +41,15 @@ pub(super) struct Response {
     pub moduli: [[f64; 3]; 3],
 }
 
+/// Returns the sum of the energies.
+pub(super) fn total_energy(responses: &[Response]) -> f64 {
+    responses.iter().map(|response| response.energy).sum()
+}
+
 /// A membrane's energy as a function of strain, for one patch of cloth after the other.
 pub(super) trait StrainLaw: Debug + Send + Sync {
     /// The declaration of the triangle.
-    fn declaration(&self) -> &Declaration;
+    fn declaration(&self) -> &'static Declaration;
     /// Evaluates all patches at their strains. Returns the responses and the number of flagged patches.
     fn respond(&self, strains: &[Strain], order: Order) -> (Vec<Response>, u64);
     /// Returns the law of the patches with these indices.
@@ -77,7 +82,7 @@ impl<E: PackedPotential<f64>> TriangleLaw<E> {
 }
 
 impl<E: PackedPotential<f64> + Debug + Send + Sync + 'static> StrainLaw for TriangleLaw<E> {
-    fn declaration(&self) -> &Declaration {
+    fn declaration(&self) -> &'static Declaration {
         E::DECLARATION
     }
 

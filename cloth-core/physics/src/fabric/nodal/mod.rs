@@ -20,6 +20,7 @@ mod assembly;
 mod fan;
 mod law;
 mod patch;
+mod shares;
 mod split;
 mod symmetric;
 mod term;

@@ -4,7 +4,7 @@
 //! along warp and weft. E = ½ (FᵀF − 1) = (½ (u·u − 1), ½ (v·v − 1), u·v) for (E_uu, E_vv, 2 E_uv).
 
 use energy_dsl::Vector3;
-use energy_solve::Precision;
+use energy_solve::{Precision, index};
 
 use super::fan::{Fan, rotated};
 use super::law::Strain;
@@ -28,6 +28,9 @@ pub(super) struct Patch {
 struct Corner {
     /// Positions of the two corners other than the middle in [`Patch::vertices`].
     ends: [usize; 2],
+    /// Positions among the pairs i ≤ j of vertices: the first end with itself, the second with itself, the first with
+    /// the second, the first with the middle, the second with the middle.
+    pairs: [u32; 5],
     /// ∇N of these corners along warp and weft, in 1/m: the rows of D_m⁻¹, where the columns of D_m are the edges from
     /// the middle.
     gradients: [[f64; 2]; 2],
@@ -46,9 +49,14 @@ impl Patch {
         vertices.dedup();
         let position = |vertex: usize| vertices.partition_point(|&known| known < vertex);
         let middle = fan.first().map_or(0, |corner| position(triangles[corner.triangle][corner.corner]));
-        let ends =
-            |at: &super::fan::Corner| [1, 2].map(|step| position(triangles[at.triangle][(at.corner + step) % 3]));
-        let corners = fan.iter().map(|at| Corner { ends: ends(at), gradients: [[0.0; 2]; 2], share: 0.0 }).collect();
+        let corner = |at: &super::fan::Corner| {
+            let ends = [1, 2].map(|step| position(triangles[at.triangle][(at.corner + step) % 3]));
+            let [i, j] = ends;
+            let pairs = [(i, i), (j, j), (i, j), (i, middle), (j, middle)];
+            let pairs = pairs.map(|(i, j)| index(pair(vertices.len(), i, j)));
+            Corner { ends, pairs, gradients: [[0.0; 2]; 2], share: 0.0 }
+        };
+        let corners = fan.iter().map(corner).collect();
         let mut patch = Self { middle, corners, vertices, area: 0.0 };
         patch.fit(fan, rest);
         patch
@@ -114,7 +122,8 @@ impl Patch {
         for corner in &self.corners {
             let [u, v] = self.threads(corner, x);
             for end in 0..2 {
-                let [along, across] = corner.gradients[end].map(|component| corner.share * component);
+                let [along, across] = corner.gradients[end];
+                let (along, across) = (corner.share * along, corner.share * across);
                 let row = &mut to[corner.ends[end]];
                 for axis in 0..4 {
                     let (uu, vv) = (along * u[axis], across * v[axis]);
@@ -138,26 +147,30 @@ impl Patch {
         let (first_pair, count) = (all.len(), self.vertices.len());
         all.resize(first_pair + count * (count + 1) / 2, T::from_f64(0.0));
         let to = &mut all[first_pair..];
-        let mut add = |i: usize, j: usize, stiffness: f64| {
-            let (i, j) = (i.min(j), i.max(j));
-            let sum = &mut to[i * (2 * count - i + 1) / 2 + j - i];
-            *sum = *sum + T::from_f64(stiffness);
-        };
+        let mut of_middle = 0.0;
         for corner in &self.corners {
             let [[a, b], [c, d]] = corner.gradients;
             let share = corner.share;
-            let [(p, q), (r, s)] =
-                [(a, b), (c, d)].map(|(a, b)| (share * (s_uu * a + s_uv * b), share * (s_uv * a + s_vv * b)));
+            let (p, q) = (share * (s_uu * a + s_uv * b), share * (s_uv * a + s_vv * b));
+            let (r, s) = (share * (s_uu * c + s_uv * d), share * (s_uv * c + s_vv * d));
             let (first, mixed, second) = (p * a + q * b, p * c + q * d, r * c + s * d);
-            let ([i, j], middle) = (corner.ends, self.middle);
-            add(i, i, first);
-            add(j, j, second);
-            add(i, j, mixed);
-            add(i, middle, -first - mixed);
-            add(j, middle, -second - mixed);
-            add(middle, middle, first + 2.0 * mixed + second);
+            let stiffnesses = [first, second, mixed, -first - mixed, -second - mixed];
+            for (&pair, stiffness) in corner.pairs.iter().zip(stiffnesses) {
+                let sum = &mut to[pair as usize];
+                *sum = *sum + T::from_f64(stiffness);
+            }
+            of_middle += first + 2.0 * mixed + second;
+        }
+        if let Some(sum) = to.get_mut(pair(count, self.middle, self.middle)) {
+            *sum = T::from_f64(of_middle);
         }
     }
+}
+
+/// Returns the position of two of `count` vertices among the pairs i ≤ j.
+fn pair(count: usize, i: usize, j: usize) -> usize {
+    let (i, j) = (i.min(j), i.max(j));
+    i * (2 * count - i + 1) / 2 + j - i
 }
 
 #[inline(always)]

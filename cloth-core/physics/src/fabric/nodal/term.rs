@@ -1,15 +1,16 @@
 use std::fmt;
+use std::ops::Range;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
 use energy_dsl::{Declaration, PackedPotential, RestError, Vector3, dispatch};
 use energy_solve::{
-    Blocks, Character, DofMap, Linearisation, Pattern, PlacedTerm, Quantity, Restriction, State, Stencils, Tally, Term,
-    TermDescription,
+    Blocks, Character, Divisible, DofMap, Linearisation, Pattern, PlacedTerm, Quantity, Restriction, Share, State,
+    Stencils, Tally, Term, TermDescription,
 };
 
-use super::assembly::{Forces, Hessians, Strains, subtract_product};
+use super::assembly::Strains;
 use super::fan::{Fan, fans};
-use super::law::{Order, Response, StrainLaw, TriangleLaw};
+use super::law::{Order, Response, StrainLaw, TriangleLaw, total_energy};
 use super::patch::Patch;
 use crate::fabric::patch_blocks::{PatchSlots, padded_stencils};
 use crate::fabric::plasticity::flowed;
@@ -26,7 +27,9 @@ pub(in super::super) type Moduli = [[f64; 3]; 3];
 #[derive(Debug)]
 pub(in super::super) struct NodalMembrane {
     name: String,
-    law: Box<dyn StrainLaw>,
+    declaration: &'static Declaration,
+    /// The laws of the active patches, [`CHUNK`] by [`CHUNK`]; before [`Term::place`], a single one for all patches.
+    pub(super) chunks: Vec<Chunk>,
     /// C_v, which plain triangles carry.
     plain: Vec<Moduli>,
     pub(super) patches: Vec<Patch>,
@@ -38,8 +41,27 @@ pub(in super::super) struct NodalMembrane {
     pub(super) slots: Vec<PatchSlots>,
     /// How rest shapes yield; `None` if they do not.
     flow: Option<Flow>,
+    /// The chunks with a patch at a vertex of each share; set by [`PlacedTerm::divide`].
+    pub(super) shares: Vec<Vec<usize>>,
+}
+
+/// Patches whose laws are evaluated together.
+pub(super) const CHUNK: usize = 64;
+
+/// The law of consecutive active patches.
+#[derive(Debug)]
+pub(super) struct Chunk {
+    /// Their numbers among the active patches.
+    pub numbers: Range<usize>,
+    law: Box<dyn StrainLaw>,
     /// U where forces or Jacobians were last evaluated, as bits.
-    found: AtomicU64,
+    pub found: AtomicU64,
+}
+
+impl Chunk {
+    fn new(numbers: Range<usize>, law: Box<dyn StrainLaw>) -> Self {
+        Self { numbers, law, found: AtomicU64::default() }
+    }
 }
 
 /// A mesh at rest, divided into fans.
@@ -115,30 +137,34 @@ impl NodalMembrane {
         let triangles = mesh.triangles().iter().map(|corners| corners.map(|vertex| first + vertex)).collect();
         let areas: Vec<f64> = patches.iter().map(|patch| patch.area).collect();
         let (stencils, arity) = padded_stencils(patches.iter().map(|patch| &patch.vertices[..]));
+        let of_all = law(&areas)?;
         Ok(Self {
             name,
+            declaration: of_all.declaration(),
+            chunks: vec![Chunk::new(0..patches.len(), of_all)],
+            shares: Vec::new(),
             stencils,
             arity,
             plain,
             active: Vec::new(),
             slots: Vec::new(),
-            found: AtomicU64::default(),
             patches,
-            law: law(&areas)?,
             flow: limit.map(|limit| Flow { triangles, rest: rest.to_vec(), fans, law, limit }),
         })
     }
 
-    fn tally(&self, flagged: u64) -> Tally {
+    pub(super) fn tally(&self, flagged: u64) -> Tally {
         let evaluated = self.active.len() as u64;
         Tally { evaluated, skipped: self.patches.len() as u64 - evaluated, flagged, projected: 0 }
     }
 
-    /// Evaluates the patches with a free vertex: A_v (W(Ē) − ½ Ē : C_v : Ē) and its derivatives by Ē.
-    fn responses(&self, x: &[Vector3<f64>], order: Order) -> (Vec<Response>, u64) {
-        let strains = dispatch(Strains { of: self, x });
-        let (mut all, flagged) = self.law.respond(&strains, order);
-        for ((response, strain), &patch) in all.iter_mut().zip(&strains).zip(&self.active) {
+    /// Evaluates the patches of a chunk: A_v (W(Ē) − ½ Ē : C_v : Ē) and its derivatives by Ē. Returns the number of
+    /// flagged patches as well, and notes U.
+    pub(super) fn responses(&self, chunk: &Chunk, x: &[Vector3<f64>], order: Order) -> (Vec<Response>, u64) {
+        let patches = &self.active[chunk.numbers.clone()];
+        let strains = dispatch(Strains { of: self, patches, x });
+        let (mut all, flagged) = chunk.law.respond(&strains, order);
+        for ((response, strain), &patch) in all.iter_mut().zip(&strains).zip(patches) {
             for i in 0..3 {
                 let moduli = self.plain[patch][i].map(|entry| self.patches[patch].area * entry);
                 let stress = dot(moduli, *strain);
@@ -147,15 +173,29 @@ impl NodalMembrane {
                 (0..3).for_each(|j| response.moduli[i][j] -= moduli[j]);
             }
         }
+        if order != Order::Value {
+            chunk.found.store(total_energy(&all).to_bits(), Relaxed);
+        }
         (all, flagged)
     }
 
-    /// Evaluates all patches, and notes U.
-    fn linearised(&self, x: &[Vector3<f64>], order: Order) -> (Vec<Response>, u64) {
-        let (responses, flagged) = self.responses(x, order);
-        let energy: f64 = responses.iter().map(|response| response.energy).sum();
-        self.found.store(energy.to_bits(), Relaxed);
-        (responses, flagged)
+    /// Evaluates all active patches.
+    fn all_responses(&self, x: &[Vector3<f64>], order: Order) -> Vec<Response> {
+        self.chunks.iter().flat_map(|chunk| self.responses(chunk, x, order).0).collect()
+    }
+
+    /// Returns the laws of active patches with these numbers, which ascend.
+    fn chunks_of(&self, numbers: &[usize]) -> Vec<Chunk> {
+        let (mut chunks, mut first) = (Vec::new(), 0);
+        for chunk in &self.chunks {
+            let end = numbers.partition_point(|&number| number < chunk.numbers.end);
+            let within: Vec<usize> = numbers[first..end].iter().map(|number| number - chunk.numbers.start).collect();
+            if !within.is_empty() {
+                chunks.push(Chunk::new(first..end, chunk.law.selected(&within)));
+            }
+            first = end;
+        }
+        chunks
     }
 
     /// Takes the rest shapes of the flow.
@@ -164,12 +204,20 @@ impl NodalMembrane {
         for (patch, fan) in self.patches.iter_mut().zip(&flow.fans) {
             patch.fit(fan, &flow.rest);
         }
-        let areas: Vec<f64> = self.active.iter().map(|&patch| self.patches[patch].area).collect();
-        // Rest shapes that the elements refuse are not taken.
-        if let Ok(law) = (flow.law)(&areas) {
-            self.law = law;
+        for chunk in &mut self.chunks {
+            let patches = self.active[chunk.numbers.clone()].iter();
+            let areas: Vec<f64> = patches.map(|&patch| self.patches[patch].area).collect();
+            // Rest shapes that the elements refuse are not taken.
+            if let Ok(law) = (flow.law)(&areas) {
+                chunk.law = law;
+            }
         }
     }
+}
+
+/// Returns the share of a single thread, for which all chunks are evaluated.
+fn whole(vertices: usize, blocks: usize) -> Share {
+    Share { number: usize::MAX, vertices: 0..vertices, blocks: 0..blocks }
 }
 
 impl TermDescription for NodalMembrane {
@@ -178,7 +226,7 @@ impl TermDescription for NodalMembrane {
     }
 
     fn declaration(&self) -> &Declaration {
-        self.law.declaration()
+        self.declaration
     }
 
     fn character(&self) -> Character {
@@ -195,7 +243,10 @@ impl Term for NodalMembrane {
         let is_free = |&vertex: &usize| dofs.row(vertex).is_some();
         self.active =
             (0..self.patches.len()).filter(|&patch| self.patches[patch].vertices.iter().any(is_free)).collect();
-        self.law = self.law.selected(&self.active);
+        let starts = (0..self.active.len()).step_by(CHUNK);
+        let chunks = starts.map(|start| start..(start + CHUNK).min(self.active.len()));
+        let all = &self.chunks[0].law;
+        self.chunks = chunks.map(|numbers| Chunk::new(numbers.clone(), all.selected(&self.active[numbers]))).collect();
         let slots = |&patch: &usize| PatchSlots::new(&self.patches[patch].vertices, dofs, pattern);
         self.slots = self.active.iter().map(slots).collect();
         self
@@ -209,7 +260,9 @@ impl PlacedTerm for NodalMembrane {
         let of = self.stencils();
         Some(Box::new(Self {
             name: self.name.clone(),
-            law: self.law.selected(&numbers),
+            declaration: self.declaration,
+            chunks: self.chunks_of(&numbers),
+            shares: Vec::new(),
             plain: chosen().map(|patch| self.plain[patch]).collect(),
             patches: chosen().map(|patch| self.patches[patch].clone()).collect(),
             stencils: chosen().flat_map(|patch| of.stencil(patch)).collect(),
@@ -217,8 +270,15 @@ impl PlacedTerm for NodalMembrane {
             active: (0..numbers.len()).collect(),
             slots: numbers.iter().map(|&number| self.slots[number].restricted(restriction)).collect(),
             flow: None,
-            found: AtomicU64::default(),
         }))
+    }
+
+    fn divide(&mut self, shares: &[Share]) {
+        self.shares = shares.iter().map(|share| self.chunks_at(&share.vertices)).collect();
+    }
+
+    fn divisible(&self) -> Option<&dyn Divisible> {
+        Some(self)
     }
 
     fn has_energy(&self) -> bool {
@@ -226,8 +286,12 @@ impl PlacedTerm for NodalMembrane {
     }
 
     fn energy(&self, x: &[Vector3<f64>]) -> Option<(f64, Tally)> {
-        let (responses, flagged) = self.responses(x, Order::Value);
-        Some((responses.iter().map(|response| response.energy).sum(), self.tally(flagged)))
+        let add = |(sum, tally): (f64, Tally), (part, other): (f64, Tally)| {
+            let flagged = tally.flagged + other.flagged;
+            (sum + part, Tally { flagged, ..tally })
+        };
+        let parts = (0..self.energy_parts()).map(|part| self.energy_part(part, x));
+        Some(parts.fold((0.0, self.tally(0)), add))
     }
 
     fn end_step(&mut self, end: State<'_>) {
@@ -261,36 +325,28 @@ impl PlacedTerm for NodalMembrane {
     }
 
     fn energy_found(&self) -> Option<f64> {
-        Some(f64::from_bits(self.found.load(Relaxed)))
+        Some(self.chunks.iter().fold(0.0, |sum, chunk| sum + f64::from_bits(chunk.found.load(Relaxed))))
     }
 
     fn element_energies(&self, x: &[Vector3<f64>]) -> Option<Vec<(usize, f64)>> {
-        let energies = self.responses(x, Order::Value).0.into_iter().map(|response| response.energy);
+        let energies = self.all_responses(x, Order::Value).into_iter().map(|response| response.energy);
         Some(self.active.iter().copied().zip(energies).collect())
     }
 
     fn add_force(&self, state: State<'_>, force: &mut [Vector3<f64>]) -> Tally {
-        let (responses, flagged) = self.linearised(state.x, Order::Gradient);
-        dispatch(Forces { of: self, responses: &responses, x: state.x, force });
-        self.tally(flagged)
+        self.add_force_of(&whole(force.len(), 0), state, force)
     }
 
     fn add_linearisation(&self, state: State<'_>, sum: &mut Linearisation<'_>) -> Tally {
-        let (responses, flagged) = self.linearised(state.x, Order::Hessian);
-        if let Some(product) = &mut sum.stiffness_times_velocity {
-            subtract_product(self, &responses, state, product);
-        }
-        let (scale, curvature, force) = (-sum.weights.position, sum.curvature, &mut *sum.force);
-        let (of, responses, x) = (self, &responses[..], state.x);
-        match &mut sum.matrix {
-            Blocks::Single(matrix) => dispatch(Hessians { of, responses, x, scale, curvature, force, matrix }),
-            Blocks::Double(matrix) => dispatch(Hessians { of, responses, x, scale, curvature, force, matrix }),
-        }
-        self.tally(flagged)
+        let blocks = match &sum.matrix {
+            Blocks::Single(matrix) => matrix.len(),
+            Blocks::Double(matrix) => matrix.len(),
+        };
+        self.add_linearisation_of(&whole(sum.force.len(), blocks), state, sum)
     }
 
     fn find_non_finite(&self, _: Quantity, state: State<'_>) -> Option<usize> {
-        let (responses, _) = self.responses(state.x, Order::Gradient);
+        let responses = self.all_responses(state.x, Order::Gradient);
         let is_finite = |response: &Response| (response.energy + response.stress.iter().sum::<f64>()).is_finite();
         self.active.iter().zip(&responses).find(|(_, response)| !is_finite(response)).map(|(&patch, _)| patch)
     }

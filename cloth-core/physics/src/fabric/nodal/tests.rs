@@ -112,6 +112,32 @@ fn derivatives_are_those_of_the_energy() {
     }
 }
 
+#[test]
+fn matrices_with_both_triangles_hold_the_same_hessian() {
+    let mesh = irregular(4, 9);
+    let x = deformed(&mesh, 0.05, 3);
+    let bending = Bending::BridsonForce { stiffness: 1e-3, damping: 1e-4 };
+    let woven = Woven { warp: 2e3, weft: 700.0, bias: 100.0, poisson_ratio: 0.2, bending };
+    let mut system = system(&mesh, Material::OrthotropicStvk(woven), Strain::Nodal);
+    assert!(!system.character().symmetric);
+    let (_, matrix) = linearised(&mut system, &x, Curvature::Exact);
+    let mut random = fastrand::Rng::with_seed(7);
+    let direction: Vec<Vector3<f64>> = x.iter().map(|_| [0; 3].map(|_: i32| random.f64() - 0.5)).collect();
+    let mut product = vec![[0.0; 3]; x.len()];
+    matrix.multiply(&direction, &mut product);
+    let [after, before] = [1e-5, -1e-5].map(|by| {
+        let one = |(x, d): (&Vector3<f64>, &Vector3<f64>)| std::array::from_fn(|axis| x[axis] + by * d[axis]);
+        let moved: Vec<Vector3<f64>> = x.iter().zip(&direction).map(one).collect();
+        linearised(&mut system, &moved, Curvature::Exact).0
+    });
+    let largest = product.as_flattened().iter().fold(0.0_f64, |largest, f| largest.max(f.abs()));
+    for (exact, (after, before)) in
+        product.as_flattened().iter().zip(after.as_flattened().iter().zip(before.as_flattened()))
+    {
+        assert!(((before - after) / 2e-5 - exact).abs() < 1e-6 * largest, "{before}, {after} for {exact}");
+    }
+}
+
 /// A quarter of a tube, whose triangles start at any of their corners.
 fn tube(cells: usize, first_corner: impl Fn(usize) -> usize) -> TriangleMesh {
     let flat = irregular(cells, 3);
@@ -159,5 +185,28 @@ fn clamped_hessians_have_no_negative_curvature() {
             least
         });
         assert!(clamped >= 0.0 && exact < clamped, "{material:?}: {exact} and {clamped}");
+    }
+}
+
+#[test]
+fn threads_do_not_change_a_bit() {
+    let mesh = irregular(40, 6);
+    let x = deformed(&mesh, 0.002, 8);
+    for material in [materials().remove(1), materials().remove(6)] {
+        let [alone, others @ ..] = [1, 2, 3].map(|threads| {
+            let mut system = system(&mesh, material.clone(), Strain::Nodal);
+            system.set_threads(threads);
+            let energy = energy(&mut system, &x);
+            let mut matrix = system.matrix();
+            let weights = Weights { position: -1.0, velocity: 0.0 };
+            let mut options = LinearisationOptions::new(weights, Curvature::Clamped);
+            options.stiffness_times_velocity = true;
+            let linear = system.linearise(State { x: &x, v: &x }, options, &mut matrix).unwrap();
+            let mut product = vec![[0.0; 3]; x.len()];
+            matrix.multiply(&x, &mut product);
+            (energy, linear.force.to_vec(), linear.stiffness_times_velocity.to_vec(), product)
+        });
+        assert!(alone.2.as_flattened().iter().any(|rate| rate.abs() > 0.0));
+        others.iter().for_each(|other| assert!(*other == alone, "{material:?}"));
     }
 }

@@ -5,7 +5,7 @@ use energy_elements::ArcAngle;
 use energy_solve::{Linearisation, Precision, TriangleBuffer};
 
 use super::term::{Angles, PlateTerm};
-use crate::fabric::patch_blocks::{Factors, GROUP, Row};
+use crate::fabric::patch_blocks::{BlocksFrom, GROUP, Right, Row, converted};
 
 /// Number of entries in the upper triangle of ∇²θ.
 const HESSIAN: usize = 90;
@@ -77,6 +77,33 @@ fn add_times(sum: &mut Vector3<f64>, block: &Block<f64>, v: &Vector3<f64>, trans
     }
 }
 
+/// Returns the energy of each active patch, and adds ∂U/∂θ of each hinge if asked.
+pub(super) struct Energies<'a> {
+    pub(super) of: &'a PlateTerm,
+    /// θ − θ̄ of each hinge.
+    pub(super) angles: &'a [f64],
+    pub(super) moments: Option<&'a mut [f64]>,
+}
+
+impl Kernel for Energies<'_> {
+    type Output = Vec<f64>;
+
+    #[inline(always)]
+    fn run<L: Level>(self) -> Vec<f64> {
+        let Self { of, angles, mut moments } = self;
+        let mut energies = vec![0.0; of.active.len()];
+        for (energy, &patch) in energies.iter_mut().zip(&of.active) {
+            let (found, [x, y, z]) = of.response::<L>(patch, angles);
+            *energy = found;
+            let Some(moments) = &mut moments else { continue };
+            for angle in &of.patches[patch].angles {
+                moments[angle.hinge()] += angle.b[0] * x + angle.b[1] * y + angle.b[2] * z;
+            }
+        }
+        energies
+    }
+}
+
 /// Adds s Σ ∇r ∇rᵀ to the matrix.
 pub(super) struct OuterProducts<'a, T> {
     pub(super) of: &'a PlateTerm,
@@ -92,27 +119,28 @@ impl<T: Precision> Kernel for OuterProducts<'_, T> {
     fn run<L: Level>(self) {
         let Self { of, angles, s, matrix } = self;
         let s = T::from_f64(s);
-        let (mut rows, mut factors): (Vec<Row<T>>, Vec<[Factors<T>; 3]>) = (Vec::new(), Vec::new());
+        let mut gradients = vec![[[T::from_f64(0.0); 4]; 4]; angles.gradients.len()];
+        for (single, gradient) in gradients.iter_mut().zip(&angles.gradients) {
+            *single = converted(gradient);
+        }
+        let mut to = BlocksFrom { first: 0, blocks: matrix };
+        let (mut rows, mut rights): (Vec<Row<T>>, Vec<Right<T>>) = (Vec::new(), Vec::new());
         for (patches, patch_slots) in of.active.chunks(GROUP).zip(of.patch_slots.chunks(GROUP)) {
             rows.clear();
             for &patch in patches {
-                of.patches[patch].append_gradients(&angles.gradients, &mut rows);
+                of.patches[patch].append_gradients::<L, T>(&gradients, &mut rows);
             }
             // Written in place: pushes would spill the registers.
-            factors.resize(rows.len(), [Factors::zeros(); 3]);
-            for (factors, row) in factors.iter_mut().zip(&rows) {
+            rights.resize(rows.len(), Right::zeros());
+            for (right, row) in rights.iter_mut().zip(&rows) {
                 // `black_box` keeps LLVM from vectorising this loop with scatters, which take longer than the rest.
-                let factors = std::hint::black_box(factors);
-                for k in 0..3 {
-                    let [a, b, c, d] = row[k];
-                    factors[k] = Factors::new(&[s * a, s * b, s * c, d], &row[k]);
-                }
+                *std::hint::black_box(right) = Right::of(row);
             }
-            let mut left = &factors[..];
+            let mut first = 0;
             for patch_slots in patch_slots {
-                let (own, others) = left.split_at(patch_slots.vertices);
-                patch_slots.add(own, None, matrix);
-                left = others;
+                let own = first..first + patch_slots.vertices;
+                first = own.end;
+                patch_slots.add::<L, T>((s, &rows[own.clone()], &rights[own]), None, &mut to);
             }
         }
     }

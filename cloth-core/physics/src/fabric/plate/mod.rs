@@ -21,8 +21,12 @@
 //! free edges the natural condition, zero bending moment, eliminates p.
 
 mod assembly;
+mod friction;
+mod patch;
 mod rigidity;
 mod term;
+#[cfg(test)]
+mod tests;
 mod tilt;
 
 pub use rigidity::{Rigidity, RigidityError};
@@ -63,8 +67,8 @@ pub struct Curvature {
 /// each triangle's first edge.
 ///
 /// # Errors
-/// Returns an error if a triangle is perpendicular to the warp.
-pub fn curvatures(mesh: &TriangleMesh, topology: &Topology, warp: Option<Warp>) -> Result<Vec<Curvature>, ThreadError> {
+/// Returns an error if a triangle is perpendicular to the warp, or two neighbours have opposite fronts.
+pub fn curvatures(mesh: &TriangleMesh, topology: &Topology, warp: Option<Warp>) -> Result<Vec<Curvature>, PlateError> {
     let tilts = Tilts::of(mesh, topology, warp)?;
     let mut curvatures = Vec::with_capacity(mesh.triangles().len());
     for (triangle, sides) in tilts.sides.iter().enumerate() {

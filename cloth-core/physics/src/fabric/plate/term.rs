@@ -1,8 +1,8 @@
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
 use energy_dsl::{
-    BLOCK, Batch, BatchWork, Block, Declaration, Element, Lane, Level, Mask, Packed, Potential, Vector3, dispatch,
-    for_each_batch,
+    BLOCK, Baseline, Batch, BatchWork, Block, Declaration, Element, Lane, Level, Mask, Packed, Potential, Vector3,
+    dispatch, for_each_batch,
 };
 use energy_elements::ArcAngle;
 use energy_solve::{
@@ -10,9 +10,11 @@ use energy_solve::{
     Restriction, ScatterMaps, State, Stencils, Tally, Term, TermDescription, index,
 };
 
-use super::assembly::{CurvedPart, OuterProducts};
+use super::assembly::{CurvedPart, Energies, OuterProducts};
+use super::friction::Friction;
+use super::patch::{Angle, Matrix, Patch};
 use super::rigidity::cholesky;
-use super::{Curvature, Rigidity, RigidityError, ThreadError, curvatures};
+use super::{Rigidity, RigidityError, ThreadError, curvatures};
 use crate::fabric::patch_blocks::{PatchSlots, Row, padded_stencils};
 use crate::fabric::plasticity::{angle_of_curvature, flow};
 use crate::geometry::dot;
@@ -32,9 +34,11 @@ pub struct PlateTerm {
     rest: Vec<f64>,
     /// The largest |θ − θ̄| of each hinge; `None` if hinges do not yield.
     limits: Option<Vec<f64>>,
-    /// The moment at which triangles yield, in N; `None` if they do not.
-    largest_moment: Option<f64>,
+    /// L of the rigidity D = L Lᵀ.
+    factor: Matrix,
     pub(super) patches: Vec<Patch>,
+    /// How each patch yields; empty if they do not.
+    frictions: Vec<Friction>,
     /// Vertices of the patches, padded to the same number by repeating the first.
     stencils: Vec<u32>,
     arity: usize,
@@ -49,28 +53,6 @@ pub struct PlateTerm {
     found: AtomicU64,
 }
 
-/// A triangle and the hinges that its curvature depends on.
-#[derive(Clone, Debug)]
-pub(super) struct Patch {
-    /// Its vertices, in ascending order.
-    vertices: Vec<usize>,
-    /// Its hinges: their indices, their b, and the positions of their points in `vertices`.
-    angles: Vec<Angle>,
-    /// Rest area, in m².
-    area: f64,
-    /// √(A D₁₁).
-    scale: f64,
-    /// The part of Σ b (θ − θ̄) that is plastic.
-    plastic: [f64; 3],
-}
-
-#[derive(Clone, Copy, Debug)]
-struct Angle {
-    hinge: usize,
-    b: [f64; 3],
-    local: [u8; 4],
-}
-
 /// A plate that does not fit a mesh.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -81,6 +63,15 @@ pub enum PlateError {
     /// A triangle has no warp direction.
     #[error(transparent)]
     Threads(#[from] ThreadError),
+    /// Neighbours run the same way along their edge: the sense of an angle differs between them.
+    #[error(
+        "triangles {} and {} are neighbours with opposite fronts; turn the corners of one around, in Blender by Mesh > \
+         Normals > Recalculate Outside", .triangles[0], .triangles[1]
+    )]
+    Unoriented {
+        /// The two triangles.
+        triangles: [usize; 2],
+    },
 }
 
 impl PlateTerm {
@@ -109,8 +100,9 @@ impl PlateTerm {
             hinges,
             rest,
             limits: None,
-            largest_moment: None,
+            factor,
             patches,
+            frictions: Vec::new(),
             stencils,
             arity,
             active: Vec::new(),
@@ -135,7 +127,35 @@ impl PlateTerm {
     /// width. Other plates yield at ½ ‖r‖² = ½ A M²/D₁₁.
     #[must_use]
     pub fn with_plastic_curvature(self, moment: f64) -> Self {
-        Self { largest_moment: Some(moment), ..self }
+        let friction = |patch: &Patch| Friction::of_all(largest(moment, patch, &self.factor));
+        Self { frictions: self.patches.iter().map(friction).collect(), ..self }
+    }
+
+    /// Adds an isotropic plate that yields at this moment, in N, as [`PlateTerm::with_plastic_curvature`] says. One term
+    /// for both takes as long as one plate. Its rigidity is not zero.
+    ///
+    /// # Errors
+    /// Returns an error if rigidities contradict each other.
+    ///
+    /// ```
+    /// use cloth_physics::fabric::{PlateTerm, Rigidity};
+    /// use cloth_physics::mesh::{Diagonals, Plane, Sheet};
+    ///
+    /// let (diagonals, plane) = (Diagonals::Regular, Plane::Horizontal);
+    /// let mesh = Sheet { cells: [4, 4], size: [0.1; 2], diagonals, plane, pleats: None }.mesh()?;
+    /// let yarns = Rigidity::Orthotropic { warp: 9e-6, weft: 4e-6, bias: 5e-6, poisson_ratio: 0.1 };
+    /// let friction = Rigidity::Flexural { rigidity: 8e-6, poisson_ratio: 0.0 };
+    /// let plate = PlateTerm::new("bending", &mesh, &yarns, [1.0, 0.0, 0.0])?.with_friction(&friction, 0.16e-3)?;
+    /// assert_eq!(plate.triangles(), 32);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn with_friction(mut self, rigidity: &Rigidity, moment: f64) -> Result<Self, PlateError> {
+        let second = cholesky(&rigidity.matrix()?);
+        let friction = |patch: &mut Patch| {
+            Friction::of_part(patch.add_plate(&self.factor, &second), largest(moment, patch, &second))
+        };
+        self.frictions = self.patches.iter_mut().map(friction).collect();
+        Ok(self)
     }
 
     /// Shifts the vertex indices by `first`, for a mesh that is one of several in a system.
@@ -166,48 +186,36 @@ impl PlateTerm {
         values
     }
 
-    /// Returns ½ ‖r‖² of each patch with a free vertex, from the angles θ − θ̄ of all hinges.
-    fn half_squares<'a>(&'a self, angles: &'a [f64]) -> impl Iterator<Item = (usize, f64)> + 'a {
-        let half_square = |patch: usize| {
-            let r = self.patches[patch].residual(angles);
-            0.5 * dot(r, r)
-        };
-        self.active.iter().map(move |&patch| (patch, half_square(patch)))
+    /// Returns the energy of a patch and its derivative by r, from the angles θ − θ̄ of all hinges.
+    #[inline(always)]
+    pub(super) fn response<L: Level>(&self, patch: usize, angles: &[f64]) -> (f64, [f64; 3]) {
+        let r = self.patches[patch].residual::<L>(angles);
+        self.frictions.get(patch).map_or_else(|| (0.5 * dot(r, r), r), |friction| friction.response(r))
     }
 
-    fn sum(&self, angles: &[f64]) -> f64 {
-        self.half_squares(angles).map(|(_, energy)| energy).sum()
+    /// Returns the energy of each patch with a free vertex.
+    fn energies(&self, angles: &[f64]) -> Vec<f64> {
+        dispatch(Energies { of: self, angles, moments: None })
     }
 
-    /// Evaluates θ − θ̄ and ∇θ of all needed hinges, and notes U.
+    /// Evaluates θ − θ̄, ∇θ and ∂U/∂θ of all needed hinges, and notes U.
     fn angles(&self, x: &[Vector3<f64>]) -> Angles<'_> {
         let mut angles = Angles {
             needed: &self.needed,
             values: self.rest.iter().map(|rest| -rest).collect(),
             gradients: vec![[[0.0; 4]; 4]; self.hinges.len()],
+            moments: vec![0.0; self.hinges.len()],
             rows: [0.0; 12 * BLOCK],
             flagged: 0,
         };
         for_each_batch(&self.packed, x, &mut angles);
-        self.found.store(self.sum(&angles.values).to_bits(), Relaxed);
+        let energies = dispatch(Energies { of: self, angles: &angles.values, moments: Some(&mut angles.moments) });
+        self.found.store(energies.iter().sum::<f64>().to_bits(), Relaxed);
         angles
     }
 
-    /// Returns m = ∂U/∂θ of all hinges.
-    fn moments(&self, angles: &Angles<'_>) -> Vec<f64> {
-        let mut moments = vec![0.0; self.hinges.len()];
-        for &patch in &self.active {
-            let patch = &self.patches[patch];
-            let r = patch.residual(&angles.values);
-            for angle in &patch.angles {
-                moments[angle.hinge] += dot(angle.b, r);
-            }
-        }
-        moments
-    }
-
-    fn subtract_force(&self, angles: &Angles<'_>, moments: &[f64], force: &mut [Vector3<f64>]) {
-        for ((hinge, moment), gradient) in self.hinges.iter().zip(moments).zip(&angles.gradients) {
+    fn subtract_force(&self, angles: &Angles<'_>, force: &mut [Vector3<f64>]) {
+        for ((hinge, moment), gradient) in self.hinges.iter().zip(&angles.moments).zip(&angles.gradients) {
             for (point, &vertex) in hinge.iter().enumerate() {
                 for axis in 0..3 {
                     force[vertex][axis] -= moment * gradient[point][axis];
@@ -221,6 +229,11 @@ impl PlateTerm {
         let mut curved_part = CurvedPart::new(self, moments, state.v, sum);
         for_each_batch(&self.packed, state.x, &mut curved_part);
     }
+}
+
+/// Returns the largest ‖r‖ of a plate with D = L Lᵀ that has at most this moment, in N: ‖r‖ = √A M/√D₁₁.
+fn largest(moment: f64, patch: &Patch, factor: &Matrix) -> f64 {
+    moment * patch.area.sqrt() / factor[0][0]
 }
 
 /// θ − θ̄ of each hinge; starts at −θ̄.
@@ -247,6 +260,8 @@ pub(super) struct Angles<'a> {
     values: Vec<f64>,
     /// Four vectors, each padded to four components.
     pub(super) gradients: Vec<[[f64; 4]; 4]>,
+    /// ∂U/∂θ of each hinge.
+    moments: Vec<f64>,
     rows: [f64; 12 * BLOCK],
     flagged: u64,
 }
@@ -270,95 +285,6 @@ impl BatchWork<ArcAngle> for Angles<'_> {
 /// Counts the flagged lanes among the first `count`.
 fn flagged(lanes: u32, count: usize) -> u64 {
     u64::from((lanes & (u32::MAX >> (32 - count))).count_ones())
-}
-
-impl Patch {
-    /// Sets r = √A (1 − Q Qᵀ) Lᵀ κ with D = L Lᵀ. Q spans the directions that the angles at free edges can reach;
-    /// minimising over them makes these components 0. Returns `None` if nothing remains.
-    fn new(curvature: &Curvature, factor: &[[f64; 3]; 3], hinges: &[[usize; 4]]) -> Option<Self> {
-        let scaled = |b: &[f64; 3]| -> [f64; 3] {
-            std::array::from_fn(|k| curvature.area.sqrt() * (0..3).map(|i| factor[i][k] * b[i]).sum::<f64>())
-        };
-        let mut directions: Vec<[f64; 3]> = Vec::new();
-        for free in &curvature.free {
-            let mut direction = scaled(free);
-            let before = dot(direction, direction);
-            directions.iter().for_each(|q| project_out(&mut direction, q));
-            let length = dot(direction, direction);
-            if length > 1e-20 * before {
-                directions.push(direction.map(|component| component / length.sqrt()));
-            }
-        }
-        let mut angles = Vec::new();
-        for &(hinge, b) in &curvature.angles {
-            let mut b = scaled(&b);
-            directions.iter().for_each(|q| project_out(&mut b, q));
-            angles.push(Angle { hinge, b, local: [0; 4] });
-        }
-        let largest = angles.iter().map(|angle| dot(angle.b, angle.b)).fold(0.0, f64::max);
-        angles.retain(|angle| dot(angle.b, angle.b) > 1e-24 * largest);
-        let mut vertices: Vec<usize> = angles.iter().flat_map(|angle| hinges[angle.hinge]).collect();
-        vertices.sort_unstable();
-        vertices.dedup();
-        for angle in &mut angles {
-            angle.local = hinges[angle.hinge].map(|vertex| {
-                u8::try_from(vertices.partition_point(|&known| known < vertex)).expect("a patch has few vertices")
-            });
-        }
-        let (area, scale) = (curvature.area, curvature.area.sqrt() * factor[0][0]);
-        (!angles.is_empty()).then_some(Self { vertices, angles, area, scale, plastic: [0.0; 3] })
-    }
-
-    /// Moves the plastic part until the moment is at most the given one, in N.
-    fn flow(&mut self, values: &[f64], moment: f64) {
-        let r = self.residual(values);
-        // ‖r‖ = √(A/D) M of an isotropic plate; `scale` is √(A D).
-        let (size, limit) = (dot(r, r).sqrt(), moment * self.area / self.scale);
-        if size > limit {
-            (0..3).for_each(|k| self.plastic[k] += (1.0 - limit / size) * r[k]);
-        }
-    }
-
-    /// Returns the same patch, whose hinges have new indices.
-    fn renumbered(&self, new_index: &[usize]) -> Self {
-        let angles = self.angles.iter().map(|angle| Angle { hinge: new_index[angle.hinge], ..*angle }).collect();
-        Self { vertices: self.vertices.clone(), angles, ..*self }
-    }
-
-    fn residual(&self, values: &[f64]) -> [f64; 3] {
-        let mut r = self.plastic.map(|part| -part);
-        for angle in &self.angles {
-            for k in 0..3 {
-                r[k] += angle.b[k] * values[angle.hinge];
-            }
-        }
-        r
-    }
-
-    /// Appends ∇r: three vectors per vertex.
-    #[inline(always)]
-    pub(super) fn append_gradients<T: Precision>(&self, gradients: &[[[f64; 4]; 4]], all: &mut Vec<Row<T>>) {
-        let first = all.len();
-        all.resize(first + self.vertices.len(), [[T::from_f64(0.0); 4]; 3]);
-        let rows = &mut all[first..];
-        for angle in &self.angles {
-            let gradient = &gradients[angle.hinge];
-            for point in 0..4 {
-                let row = &mut rows[angle.local[point] as usize];
-                for k in 0..3 {
-                    let b = T::from_f64(angle.b[k]);
-                    for axis in 0..4 {
-                        row[k][axis] = row[k][axis] + b * T::from_f64(gradient[point][axis]);
-                    }
-                }
-            }
-        }
-    }
-}
-
-fn project_out(vector: &mut [f64; 3], unit: &[f64; 3]) {
-    let part = dot(*vector, *unit);
-    (0..3).for_each(|k| vector[k] -= part * unit[k]);
 }
 
 impl TermDescription for PlateTerm {
@@ -385,7 +311,7 @@ impl Term for PlateTerm {
         self.active =
             (0..self.patches.len()).filter(|&patch| self.patches[patch].vertices.iter().any(is_free)).collect();
         let mut needed: Vec<usize> =
-            self.active.iter().flat_map(|&patch| self.patches[patch].angles.iter().map(|angle| angle.hinge)).collect();
+            self.active.iter().flat_map(|&patch| self.patches[patch].angles.iter().map(Angle::hinge)).collect();
         needed.sort_unstable();
         needed.dedup();
         let element = ArcAngle::new();
@@ -408,7 +334,7 @@ impl PlacedTerm for PlateTerm {
         let patches: Vec<&Patch> = numbers.iter().map(|&number| &self.patches[self.active[number]]).collect();
         let stencil = |&number: &usize| self.stencils().stencil(self.active[number]);
         let mut is_needed = vec![false; self.hinges.len()];
-        patches.iter().flat_map(|patch| &patch.angles).for_each(|angle| is_needed[angle.hinge] = true);
+        patches.iter().flat_map(|patch| &patch.angles).for_each(|angle| is_needed[angle.hinge()] = true);
         let kept: Vec<usize> = (0..self.needed.len()).filter(|&number| is_needed[self.needed[number]]).collect();
         let hinges: Vec<usize> = kept.iter().map(|&number| self.needed[number]).collect();
         let mut new_index = vec![0; self.hinges.len()];
@@ -418,7 +344,8 @@ impl PlacedTerm for PlateTerm {
             hinges: hinges.iter().map(|&hinge| self.hinges[hinge]).collect(),
             rest: hinges.iter().map(|&hinge| self.rest[hinge]).collect(),
             limits: None,
-            largest_moment: None,
+            factor: self.factor,
+            frictions: numbers.iter().filter_map(|&number| self.frictions.get(self.active[number]).copied()).collect(),
             patches: patches.iter().map(|patch| patch.renumbered(&new_index)).collect(),
             stencils: numbers.iter().flat_map(stencil).collect(),
             arity: self.arity,
@@ -437,7 +364,7 @@ impl PlacedTerm for PlateTerm {
 
     fn energy(&self, x: &[Vector3<f64>]) -> Option<(f64, Tally)> {
         let values = self.values(x);
-        Some((self.sum(&values.angles), self.tally(values.flagged)))
+        Some((self.energies(&values.angles).iter().sum(), self.tally(values.flagged)))
     }
 
     fn end_step(&mut self, end: State<'_>) {
@@ -448,31 +375,31 @@ impl PlacedTerm for PlateTerm {
                 flow(&mut self.rest[hinge..=hinge], &strains[hinge..=hinge], &limits[hinge..=hinge]);
             }
         }
-        if let Some(moment) = self.largest_moment {
+        if !self.frictions.is_empty() {
             let angles = self.values(end.x).angles;
-            self.active.iter().for_each(|&patch| self.patches[patch].flow(&angles, moment));
+            self.active
+                .iter()
+                .for_each(|&patch| self.frictions[patch].flow(self.patches[patch].residual::<Baseline>(&angles)));
         }
     }
 
     fn is_driven(&self) -> bool {
-        self.limits.is_some() || self.largest_moment.is_some()
+        self.limits.is_some() || !self.frictions.is_empty()
     }
 
     fn history(&self) -> Vec<f64> {
         let rest = self.limits.as_ref().map_or(&[][..], |_| &self.rest);
-        let patches = if self.largest_moment.is_some() { &self.patches[..] } else { &[] };
-        rest.iter().copied().chain(patches.iter().flat_map(|patch| patch.plastic)).collect()
+        rest.iter().copied().chain(self.frictions.iter().flat_map(|friction| friction.plastic)).collect()
     }
 
     fn restore_history(&mut self, history: &[f64]) {
         let rest = if self.limits.is_some() { self.rest.len() } else { 0 };
-        let patches = if self.largest_moment.is_some() { self.patches.len() } else { 0 };
-        if history.len() != rest + 3 * patches {
+        if history.len() != rest + 3 * self.frictions.len() {
             return;
         }
         self.rest[..rest].copy_from_slice(&history[..rest]);
-        for (patch, saved) in self.patches.iter_mut().zip(history[rest..].chunks_exact(3)) {
-            patch.plastic.copy_from_slice(saved);
+        for (friction, saved) in self.frictions.iter_mut().zip(history[rest..].chunks_exact(3)) {
+            friction.plastic.copy_from_slice(saved);
         }
     }
 
@@ -481,19 +408,18 @@ impl PlacedTerm for PlateTerm {
     }
 
     fn element_energies(&self, x: &[Vector3<f64>]) -> Option<Vec<(usize, f64)>> {
-        Some(self.half_squares(&self.values(x).angles).collect())
+        Some(self.active.iter().copied().zip(self.energies(&self.values(x).angles)).collect())
     }
 
     fn add_force(&self, state: State<'_>, force: &mut [Vector3<f64>]) -> Tally {
         let angles = self.angles(state.x);
-        self.subtract_force(&angles, &self.moments(&angles), force);
+        self.subtract_force(&angles, force);
         self.tally(angles.flagged)
     }
 
     fn add_linearisation(&self, state: State<'_>, sum: &mut Linearisation<'_>) -> Tally {
         let angles = self.angles(state.x);
-        let moments = self.moments(&angles);
-        self.subtract_force(&angles, &moments, sum.force);
+        self.subtract_force(&angles, sum.force);
         match &mut sum.matrix {
             Blocks::Single(matrix) => self.add_outer_products(&angles, -sum.weights.position, matrix),
             Blocks::Double(matrix) => self.add_outer_products(&angles, -sum.weights.position, matrix),
@@ -502,7 +428,7 @@ impl PlacedTerm for PlateTerm {
             self.subtract_products(&angles, state.v, product);
         }
         if sum.curvature == CurvaturePolicy::Exact {
-            self.add_curved_part(&moments, state, sum);
+            self.add_curved_part(&angles.moments, state, sum);
         }
         self.tally(angles.flagged)
     }
@@ -511,8 +437,9 @@ impl PlacedTerm for PlateTerm {
         let angles = self.angles(state.x);
         let is_finite = |patch: &Patch| {
             let finite =
-                |angle: &Angle| angles.gradients[angle.hinge].as_flattened().iter().all(|number| number.is_finite());
-            patch.residual(&angles.values).iter().all(|number| number.is_finite()) && patch.angles.iter().all(finite)
+                |angle: &Angle| angles.gradients[angle.hinge()].as_flattened().iter().all(|number| number.is_finite());
+            patch.residual::<Baseline>(&angles.values).iter().all(|number| number.is_finite())
+                && patch.angles.iter().all(finite)
         };
         self.active.iter().copied().find(|&patch| !is_finite(&self.patches[patch]))
     }
@@ -529,7 +456,7 @@ impl PlateTerm {
         let mut rows = Vec::new();
         for patch in self.active.iter().map(|&patch| &self.patches[patch]) {
             rows.clear();
-            patch.append_gradients(&angles.gradients, &mut rows);
+            patch.append_gradients::<Baseline, f64>(&angles.gradients, &mut rows);
             for k in 0..3 {
                 let along = |(&i, row): (&usize, &Row<f64>)| (0..3).map(|axis| row[k][axis] * v[i][axis]).sum::<f64>();
                 let rate: f64 = patch.vertices.iter().zip(&rows).map(along).sum();

@@ -1,4 +1,4 @@
-use super::{ThreadError, material_coordinates};
+use super::{PlateError, material_coordinates};
 use crate::mesh::{Topology, TriangleMesh, Warp};
 
 /// For each edge, the deviation of the surface's normal at the midpoint from the bisector of the triangles' normals.
@@ -46,8 +46,8 @@ impl Tilts {
     /// Computes the tilts of a mesh at rest.
     ///
     /// # Errors
-    /// Returns an error if a triangle is perpendicular to the warp.
-    pub fn of(mesh: &TriangleMesh, topology: &Topology, warp: Option<Warp>) -> Result<Self, ThreadError> {
+    /// Returns an error if a triangle is perpendicular to the warp, or two neighbours have opposite fronts.
+    pub fn of(mesh: &TriangleMesh, topology: &Topology, warp: Option<Warp>) -> Result<Self, PlateError> {
         let mut sides = Vec::with_capacity(mesh.triangles().len());
         for triangle in 0..mesh.triangles().len() {
             sides.push(sides_of(material_coordinates(mesh, triangle, warp)?));
@@ -56,9 +56,9 @@ impl Tilts {
             let [_, _, start, end] = hinge.vertices;
             for (at, &triangle) in hinge.triangles.iter().enumerate() {
                 let corners = mesh.triangles()[triangle];
-                let first = if at == 0 { start } else { end };
-                let side = corners.iter().position(|&corner| corner == first).expect("a hinge joins its triangles");
-                debug_assert_eq!(corners[(side + 1) % 3], if at == 0 { end } else { start });
+                let edge = if at == 0 { (start, end) } else { (end, start) };
+                let side = (0..3).find(|&side| (corners[side], corners[(side + 1) % 3]) == edge);
+                let side = side.ok_or(PlateError::Unoriented { triangles: hinge.triangles })?;
                 sides[triangle][side].hinge = Some(number);
                 sides[triangle][side].across = Some(hinge.triangles[1 - at]);
             }

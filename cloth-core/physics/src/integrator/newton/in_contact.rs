@@ -36,6 +36,7 @@ impl IncrementalPotential<'_> {
     /// assembled matrix.
     pub(super) fn begin_contact(&mut self, x: &[Vector3<f64>], matrix: &BlockMatrix<f32>) {
         let Some(contact) = &mut self.contact else { return };
+        let started = Instant::now();
         let per_square = 1.0 / (self.dt * self.dt);
         let inertia: Vec<f64> = self.body.masses.iter().map(|mass| per_square * mass).collect();
         let dofs = self.body.system.dofs();
@@ -43,6 +44,7 @@ impl IncrementalPotential<'_> {
         let resistance = Resistance::new(dofs, (0..dofs.free().len()).map(block), inertia);
         contact.lag_friction(&resistance);
         self.resistance = Some(resistance);
+        self.report.phases.contact += started.elapsed();
         self.update_active_set(x);
     }
 
@@ -61,8 +63,9 @@ impl IncrementalPotential<'_> {
     }
 
     /// Adds the contribution of contact to −∇E of the free vertices.
-    pub(super) fn add_contact(&self, x: &[Vector3<f64>], downhill: &mut [Vector3<f64>]) {
+    pub(super) fn add_contact(&mut self, x: &[Vector3<f64>], downhill: &mut [Vector3<f64>]) {
         let Some(contact) = &self.contact else { return };
+        let started = Instant::now();
         let square = self.dt * self.dt;
         let mut force = vec![[0.0; 3]; x.len()];
         contact.add_force(x, &mut force);
@@ -71,6 +74,7 @@ impl IncrementalPotential<'_> {
                 downhill[axis] += square * force[vertex][axis];
             }
         }
+        self.report.phases.contact += started.elapsed();
     }
 
     /// Returns where contact presses the most at x.
@@ -81,16 +85,22 @@ impl IncrementalPotential<'_> {
     /// Returns the stiffness of the contacts, in N/m.
     pub(super) fn contacts(&mut self, x: &[Vector3<f64>], sliding: SlidingStiffness) -> Vec<Vec<Contact>> {
         let Some(contact) = &mut self.contact else { return Vec::new() };
+        let started = Instant::now();
         let contacts = contact.stiffness(self.body.system.dofs(), x, sliding);
         self.report.contact = ContactWork::between(&self.counted, &contact.counts());
+        self.report.phases.contact += started.elapsed();
         contacts
     }
 
     /// Does some work during which only these vertices move.
     pub(super) fn restricted_to<R>(&mut self, moving: &[bool], work: impl FnOnce(&mut Self) -> R) -> R {
+        let started = Instant::now();
         self.contact.iter_mut().for_each(|contact| contact.restrict(moving));
+        self.report.phases.collision += started.elapsed();
         let done = work(self);
+        let started = Instant::now();
         self.contact.iter_mut().for_each(|contact| contact.release());
+        self.report.phases.collision += started.elapsed();
         done
     }
 }

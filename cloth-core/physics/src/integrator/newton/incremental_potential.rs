@@ -63,6 +63,7 @@ impl<'a> IncrementalPotential<'a> {
     /// Evaluates E without contact: a lower bound, for contact only adds to it.
     pub(super) fn energy_without_contact(&mut self, x: &[Vector3<f64>]) -> Result<Energy, EvaluationError> {
         let started = Instant::now();
+        self.report.energies += 1;
         let mut value = self.inertia(x);
         let mut magnitude = value;
         let Some(energies) = if_finite(self.body.system.energies(x))? else {

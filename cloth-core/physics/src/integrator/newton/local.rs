@@ -80,20 +80,24 @@ impl IncrementalPotential<'_> {
     ) -> Result<Option<f64>, EvaluationError> {
         let started = Instant::now();
         let Some(restricted) = self.body.system.restricted(&few.chosen) else { return Ok(None) };
-        self.report.phases.assembly += started.elapsed();
+        self.report.phases.preparation += started.elapsed();
+        let energies = self.report.energies;
         let whole = std::mem::replace(&mut self.body.system, restricted);
         let change = self.restricted_to(&few.chosen, |local| local.minimise(x, shortest));
         let restricted = std::mem::replace(&mut self.body.system, whole);
         self.body.system.rejoin(restricted);
+        self.report.energies = energies;
         change.map(Some)
     }
 
     /// Lowers E by at most [`ITERATIONS`] iterations on the free vertices, until a move is shorter than `shortest`.
     /// Returns the change of E.
     fn minimise(&mut self, x: &mut [Vector3<f64>], shortest: f64) -> Result<f64, EvaluationError> {
+        let started = Instant::now();
         let system = &self.body.system;
         let mut matrix = system.matrix_in();
         let mut solver = OverRelaxation::with_threads(matrix.pattern(), system.threads());
+        self.report.phases.preparation += started.elapsed();
         let mut curvature = Curvature::Exact;
         let mut change = 0.0;
         for _ in 0..ITERATIONS {

@@ -6,7 +6,7 @@ mod line_search;
 mod local;
 mod pins;
 
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use energy_dsl::Vector3;
 use energy_solve::{BlockMatrix, ContactStep, EvaluationError, PlacedTerm, System};
@@ -105,6 +105,24 @@ pub struct Phases {
     /// Search for pairs that may collide, and certificates of moves.
     #[serde(default)]
     pub collision: Duration,
+    /// Forces and stiffness of pairs in contact, and their friction.
+    #[serde(default)]
+    pub contact: Duration,
+    /// Matrices, solvers and contact at the start of a step, and the systems of local eliminations.
+    #[serde(default)]
+    pub preparation: Duration,
+    /// The energy ledger, and the histories of terms.
+    #[serde(default)]
+    pub ledger: Duration,
+}
+
+impl Phases {
+    /// Adds time to the ledger, unless no phase was measured: only [`Newton`] measures them.
+    pub fn add_to_ledger(&mut self, time: Duration) {
+        if *self != Self::default() {
+            self.ledger += time;
+        }
+    }
 }
 
 impl std::ops::AddAssign for Phases {
@@ -114,6 +132,9 @@ impl std::ops::AddAssign for Phases {
         self.solve += other.solve;
         self.line_search += other.line_search;
         self.collision += other.collision;
+        self.contact += other.contact;
+        self.preparation += other.preparation;
+        self.ledger += other.ledger;
     }
 }
 
@@ -133,16 +154,18 @@ impl Newton {
         })
     }
 
-    /// Moves the body to the minimum of E. On an error the body is unchanged.
+    /// Moves the body to the minimum of E. On an error the body is unchanged. The step started at `started`.
     fn minimise(
         &mut self,
         body: &mut Body,
         contact: Option<Box<dyn ContactStep + '_>>,
         dt: f64,
+        started: Instant,
     ) -> Result<StepReport, StepError> {
         let mut memory = self.memory_for(&body.system);
         let x = self.warm_start.begin(body, dt);
-        let potential = IncrementalPotential::new(body, contact, dt);
+        let mut potential = IncrementalPotential::new(body, contact, dt);
+        potential.report.phases.preparation += started.elapsed();
         let mut iterate = Iterate::new(self.options, potential, &mut memory, &mut self.trial, x)?;
         let converged = iterate.converge();
         let (x, report) = iterate.into_result();
@@ -164,10 +187,11 @@ impl Integrator for Newton {
     }
 
     fn step(&mut self, body: &mut Body, dt: f64) -> Result<StepReport, StepError> {
+        let started = Instant::now();
         check_terms(&body.system)?;
         let mut contact = body.system.take_contact();
         let step = contact.as_mut().map(|contact| contact.begin_step(&body.x));
-        let report = self.minimise(body, step, dt);
+        let report = self.minimise(body, step, dt, started);
         contact.into_iter().for_each(|contact| body.system.set_contact(contact));
         report
     }
