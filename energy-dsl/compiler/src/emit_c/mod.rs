@@ -8,6 +8,8 @@ mod dialect;
 mod element;
 mod expression;
 mod folder;
+mod function;
+mod host;
 mod numbers;
 mod tape;
 mod warp;

@@ -4,8 +4,9 @@
 use std::fmt::Write as _;
 
 use super::dialect::{Dialect, Numbers, Precision};
-use super::element::{Element, Function};
+use super::element::Element;
 use super::expression::Expression;
+use super::function::Function;
 use crate::plan::GeneralPlan;
 use crate::tape::record;
 use energy_runtime::tape::{Instruction, Operation, ROWS};

@@ -4,7 +4,8 @@ use std::fmt::Write as _;
 
 use super::signature::{Argument, Type, arguments};
 use super::{constant, kinds, raw};
-use crate::emit_c::element::{Element, Function};
+use crate::emit_c::element::Element;
+use crate::emit_c::function::Function;
 use crate::interpreted::InputKind;
 use crate::plan::{Shape, groups};
 use energy_runtime::RoutineKind;

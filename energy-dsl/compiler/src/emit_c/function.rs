@@ -1,0 +1,141 @@
+//! The functions of an element: arguments, results, and their descriptions.
+
+use std::fmt::Write as _;
+
+use super::element::Element;
+use crate::interpreted::InputKind;
+use crate::plan::groups;
+use energy_runtime::{Kind, RoutineKind};
+
+/// An argument of a function: an array.
+pub(super) struct Argument {
+    pub(super) name: &'static str,
+    /// Numbers that it points to.
+    pub(super) size: usize,
+    pub(super) docs: String,
+}
+
+/// The function of a routine.
+pub(super) struct Function {
+    pub(super) kind: RoutineKind,
+    /// Name without that of the element: `gradient`.
+    pub(super) name: String,
+    pub(super) arguments: Vec<Argument>,
+    pub(super) results: Vec<Argument>,
+}
+
+impl Element<'_> {
+    /// Returns all functions that callers may use.
+    pub(super) fn functions(&self) -> Vec<Function> {
+        let rest = self.function(RoutineKind::Rest, &self.plan.rest.sizes());
+        let routines = self.plan.routines.iter().map(|routine| self.function(routine.kind, &routine.sizes()));
+        let expanded = self.plan.expansion.as_ref().map(|expansion| {
+            let sizes: Vec<usize> = expansion.groups.iter().map(Vec::len).collect();
+            self.function(RoutineKind::Hessian, &[1, sizes[0], sizes[1]])
+        });
+        std::iter::once(rest).chain(routines).chain(expanded).collect()
+    }
+
+    pub(super) fn function(&self, kind: RoutineKind, sizes: &[usize]) -> Function {
+        let docs = |kinds: &[InputKind]| {
+            let list = self.inputs.iter().filter(|input| kinds.contains(&input.kind)).map(|input| {
+                let unit = if input.unit.is_empty() { String::new() } else { format!(" in {}", input.unit) };
+                let size = if input.size() == 1 { String::new() } else { format!(" ({})", input.size()) };
+                format!("{}{size}{unit}", input.name)
+            });
+            list.collect::<Vec<_>>().join(", ")
+        };
+        let coordinates = self.plan.coordinates;
+        let is_residual = self.plan.declaration.kind == Kind::Residual;
+        let parameters =
+            Argument { name: "parameters", size: self.plan.parameters, docs: docs(&[InputKind::Parameter]) };
+        let mut arguments = match kind {
+            RoutineKind::Rest => {
+                vec![Argument { name: "rest", size: self.plan.shape, docs: docs(&[InputKind::Rest]) }]
+            }
+            _ if is_residual => {
+                vec![Argument { name: "u", size: coordinates, docs: docs(&[InputKind::Unknown]) }]
+            }
+            _ => vec![Argument { name: "x", size: coordinates, docs: docs(&[InputKind::Point]) }],
+        };
+        match kind {
+            RoutineKind::HessianVector => {
+                arguments.push(Argument { name: "v", size: coordinates, docs: "a vector for each point".into() });
+            }
+            RoutineKind::Force | RoutineKind::Jacobians => {
+                arguments.push(Argument { name: "v", size: coordinates, docs: "the velocities of the points".into() });
+            }
+            _ => {}
+        }
+        arguments.push(parameters);
+        if kind != RoutineKind::Rest {
+            let docs = "what the rest shape determines".to_owned();
+            arguments.push(Argument { name: "stored", size: self.plan.stored(), docs });
+        }
+        let result = |(&(name, _), &size): (&(&'static str, _), &usize)| Argument {
+            name: if kind == RoutineKind::Rest { "stored" } else { name },
+            size,
+            docs: result_docs(kind, name).to_owned(),
+        };
+        let results = groups(kind).iter().zip(sizes).map(result).collect();
+        Function { kind, name: kind.name().to_owned(), arguments, results }
+    }
+
+    pub(super) fn comment(&self, function: &Function) -> String {
+        let mut text = format!("/* {}\n", routine_docs(function.kind));
+        for argument in function.arguments.iter().chain(&function.results).filter(|argument| argument.size > 0) {
+            let _ = writeln!(text, "   {}[{}]: {}", argument.name, argument.size, argument.docs.replace("*/", "* /"));
+        }
+        text + "   Returns flags. */\n"
+    }
+
+    pub(super) fn signature(&self, function: &Function, is_term: bool) -> String {
+        let real = self.dialect.of_type(false);
+        let inputs = function.arguments.iter().map(|argument| format!("const {real} *{}", argument.name));
+        let own = [("own", &*real), ("constants", self.dialect.precision.real())];
+        let own = own.into_iter().filter(|_| is_term).map(|(name, of)| format!("const {of} *{name}"));
+        let results = function.results.iter().map(|result| format!("{real} *ENERGY_RESTRICT {}", result.name));
+        inputs.chain(own).chain(results).collect::<Vec<_>>().join(", ")
+    }
+
+    pub(super) fn arguments(&self, function: &Function, is_term: bool) -> String {
+        let own = ["own", "constants"].into_iter().filter(|_| is_term);
+        let inputs = function.arguments.iter().map(|argument| argument.name);
+        inputs.chain(own).chain(function.results.iter().map(|result| result.name)).collect::<Vec<_>>().join(", ")
+    }
+}
+
+fn routine_docs(kind: RoutineKind) -> &'static str {
+    match kind {
+        RoutineKind::Rest => "The numbers that the rest shape determines, once for each element.",
+        RoutineKind::Value => "U.",
+        RoutineKind::Gradient => "U and its gradient.",
+        RoutineKind::Hessian => "U, its gradient and its Hessian.",
+        RoutineKind::ReducedHessian => "U, its gradient and Hessian in reduced coordinates.",
+        RoutineKind::HessianVector => "The Hessian times a vector.",
+        RoutineKind::Force => "The force.",
+        RoutineKind::Jacobians => "The force and its derivatives.",
+        RoutineKind::ConstraintJacobian => "C and its derivatives.",
+        RoutineKind::ConstraintHessian => "C, its first and second derivatives.",
+        RoutineKind::GaussNewton => "U, its gradient and ks J^T J.",
+        RoutineKind::Residual => "The residual.",
+        RoutineKind::Jacobian => "The residual and its Jacobian.",
+        RoutineKind::Vertex(_) => "U, and its derivatives by one point alone.",
+    }
+}
+
+fn result_docs(kind: RoutineKind, name: &str) -> &'static str {
+    match (kind, name) {
+        (RoutineKind::Rest, _) => "the numbers",
+        (RoutineKind::ReducedHessian, "hessian") => "the upper triangle, row by row",
+        (RoutineKind::Residual | RoutineKind::Jacobian, "value") => "one number a row",
+        (RoutineKind::Jacobian, _) => "row by row",
+        (RoutineKind::Vertex(_), "gradient") => "by the point",
+        (RoutineKind::Vertex(_), "block") => "second derivatives by the point, row by row",
+        (_, "hessian" | "hessians") => "3x3 blocks (i, j) with i <= j, row by row",
+        (_, "by_position" | "by_velocity") => "3x3 blocks (i, j), row by row",
+        (_, "jacobian") => "a vector for each row and point",
+        (_, "value") => "U, or C",
+        _ => "a vector for each point",
+    }
+}
