@@ -308,7 +308,8 @@ impl Sizes {
             RoutineKind::Rest
             | RoutineKind::ReducedHessian
             | RoutineKind::ConstraintHessian
-            | RoutineKind::GaussNewton => ([unused; 3], 0),
+            | RoutineKind::GaussNewton
+            | RoutineKind::Vertex(_) => ([unused; 3], 0),
             RoutineKind::Jacobian => ([residual, slot("Jacobian", [n, rows, self.unknowns].into()), unused], 2),
         }
     }
