@@ -9,8 +9,8 @@ from typing_extensions import Self, disjoint_base
 
 __all__ = [
     "Element", "Elements", "EnergyError", "FolderInUseError", "Input", "ResourceError", "Simulation", "Snapshot",
-    "System", "audit", "catalogue", "energies", "input_files", "library_element", "read_scene", "resume", "run",
-    "scene_tables", "show", "version",
+    "System", "audit", "catalogue", "drape", "energies", "input_files", "library_element", "measured_at_end",
+    "measurement_columns", "read_scene", "resume", "run", "scene_tables", "show", "version",
 ]
 
 #: float64, or float32 where elements are evaluated in single precision.

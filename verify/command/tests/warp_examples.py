@@ -52,7 +52,7 @@ def by_hand(tris, X, mass, pinned, mu, lam, g):
     return x
 
 
-newton = runpy.run_path(str(EXAMPLES / "warp_newton.py"))
+newton = runpy.run_path(str(EXAMPLES / "warp" / "newton.py"))
 found = newton["solve"]()
 tris, X, mass = newton["sheet"]()
 mu, lam, g = float(newton["MU"]), float(newton["LAMBDA"]), np.array(newton["G"])
@@ -63,7 +63,7 @@ assert error < 1e-12, error
 assert np.abs(truth - np.insert(X, 1, 0.0, axis=1)).max() > 0.01 * newton["SIDE"]
 print(f"hanging sheet: {error:.1e} of its length")
 
-history = runpy.run_path(str(EXAMPLES / "warp_vertex_descent.py"))["solve"]()
+history = runpy.run_path(str(EXAMPLES / "warp" / "vertex_descent.py"))["solve"]()
 assert all(after <= before for before, after in zip(history, history[1:], strict=False)), history
 assert history[-1] < history[0] - 1e-6, history
 print("vertex descent: the energy falls in each sweep")
