@@ -47,10 +47,12 @@ pub fn origin(text: &str) -> Origin {
     if !text.lines().next().is_some_and(|first| first.contains(MARK)) {
         return Origin::Foreign;
     }
-    let stated = text.lines().take(40).find_map(|line| line.split_once("hash: ")).map(|(_, hash)| hash.get(..16));
-    let body = text.split_once("hash: ").and_then(|(_, rest)| rest.split_once("\n\n")).map(|(_, body)| body);
-    match (stated, body) {
-        (Some(Some(stated)), Some(body)) if *stated == format!("{:016x}", hash(body)) => Origin::Generated,
+    // Formulas may contain anything, but no line of them begins so.
+    let stated = text.lines().find_map(|line| line.trim_start_matches(['#', ' ']).strip_prefix("hash: "));
+    let hash_of = |stated: &str| stated.get(..16).map(str::to_owned);
+    let body = stated.and_then(|stated| text.split_once(&format!("hash: {stated}\n\n"))).map(|(_, body)| body);
+    match (stated.and_then(hash_of), body) {
+        (Some(stated), Some(body)) if stated == format!("{:016x}", hash(body)) => Origin::Generated,
         _ => Origin::Changed,
     }
 }
@@ -67,7 +69,7 @@ mod tests {
     #[test]
     fn files_know_whether_they_were_changed() {
         for name in ["a.h", "a.py", "CMakeLists.txt", "README.md"] {
-            let SourceFile { text, .. } = stamped(name, &["formula: a */ b".to_owned()], "int a;\n\nint b;\n");
+            let SourceFile { text, .. } = stamped(name, &["energy A: hash: a */ b".to_owned()], "int a;\n\nint b;\n");
             assert_eq!(origin(&text), Origin::Generated, "{text}");
             assert_eq!(origin(&text.replace("int b", "int c")), Origin::Changed);
             assert!(!text.contains("a */ b"));
