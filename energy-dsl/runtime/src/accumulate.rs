@@ -1,7 +1,9 @@
 use crate::array::Array;
 use crate::element::Vector3;
 use crate::numbers::{Flags, Real};
-use crate::results::{Gradient, HessianVector, ReducedHessian, Value, Vertex};
+use crate::results::{
+    Gradient, HessianVector, MixedGradient, MixedHessian, MixedProduct, ReducedHessian, Value, Vertex,
+};
 
 /// Sums the results of like terms.
 #[doc(hidden)]
@@ -124,3 +126,6 @@ accumulate!(Gradient<T, P: Vector3> { value: number, gradient: vectors });
 accumulate!(HessianVector<T, P: Vector3> { product: vectors });
 accumulate!(ReducedHessian<T, Q: Number, H: Number> { value: number, gradient: numbers, hessian: numbers });
 accumulate!(Vertex<T> { value: number, gradient: numbers, block: vectors });
+accumulate!(MixedGradient<T, Q: Number> { value: number, gradient: numbers });
+accumulate!(MixedHessian<T, Q: Number, H: Number> { value: number, gradient: numbers, hessian: numbers });
+accumulate!(MixedProduct<T, Q: Number> { product: numbers });

@@ -4,7 +4,9 @@ use crate::numbers::Flags;
 use crate::numbers::Real;
 use crate::results::{
     ConstraintHessian, ConstraintJacobian, ForceJacobians, ForceValue, Gradient, Hessian, HessianVector,
-    ReducedHessian, ResidualJacobian, ResidualValue, Value, Vertex,
+    MixedConstraintHessian, MixedConstraintJacobian, MixedForceValue, MixedGradient, MixedHessian, MixedJacobians,
+    MixedProduct, NextJacobians, NextState, ReducedHessian, ResidualJacobian, ResidualValue, StateJacobian, Value,
+    Vertex,
 };
 
 /// Selects between two results, lane by lane.
@@ -66,3 +68,15 @@ choose!(ConstraintHessian<T, R: Number, J: Vector3, H: Block> { value: numbers, 
 choose!(Vertex<T> { value: number, gradient: numbers, block: vectors });
 choose!(ResidualValue<T, R: Number> { value: numbers });
 choose!(ResidualJacobian<T, R: Number, J: Number> { value: numbers, jacobian: numbers });
+choose!(MixedGradient<T, Q: Number> { value: number, gradient: numbers });
+choose!(MixedHessian<T, Q: Number, H: Number> { value: number, gradient: numbers, hessian: numbers });
+choose!(MixedProduct<T, Q: Number> { product: numbers });
+choose!(MixedForceValue<T, Q: Number> { force: numbers });
+choose!(MixedJacobians<T, Q: Number, S: Number> { force: numbers, by_position: numbers, by_velocity: numbers });
+choose!(MixedConstraintJacobian<T, R: Number, J: Number> { value: numbers, jacobian: numbers });
+choose!(MixedConstraintHessian<T, R: Number, J: Number, H: Number> {
+    value: numbers, jacobian: numbers, hessians: numbers
+});
+choose!(NextState<T, S: Number> { state: numbers });
+choose!(NextJacobians<T, S: Number, U: Number, B: Number> { state: numbers, by_unknowns: numbers, by_state: numbers });
+choose!(StateJacobian<T, Q: Number, B: Number> { gradient: numbers, by_state: numbers });

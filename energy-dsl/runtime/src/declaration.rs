@@ -52,15 +52,42 @@ impl Property {
     }
 }
 
+/// How an input changes when the scene moves, and how it moves as an unknown.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum FieldKind {
+    /// Numbers that no motion of the scene changes. As an unknown, they move by addition.
+    Numbers,
+    /// A point in space or in a plane. As an unknown, it moves by addition.
+    Point,
+    /// A rotation, a unit quaternion w, x, y, z. As an unknown q, it moves by a rotation vector δ: q ← exp(δ) q, which
+    /// turns by |δ| about δ.
+    Rotation,
+}
+
 /// A named input.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Field {
     /// Name, as declared.
     pub name: Cow<'static, str>,
+    /// How it moves.
+    pub kind: FieldKind,
+    /// Whether it is one unknown for all elements.
+    pub shared: bool,
     /// Number of scalars.
     pub size: usize,
     /// Unit, as declared; empty if none was given.
     pub unit: Cow<'static, str>,
+}
+
+impl Field {
+    /// Returns the number of coordinates in which the input moves as an unknown: 3 for a rotation, else its size.
+    #[must_use]
+    pub const fn increments(&self) -> usize {
+        match self.kind {
+            FieldKind::Rotation => 3,
+            FieldKind::Numbers | FieldKind::Point => self.size,
+        }
+    }
 }
 
 /// Operation counts of one routine, after simplification.
@@ -141,13 +168,15 @@ pub struct Declaration {
     pub formula: Cow<'static, str>,
     /// Source of the declaration with everything it uses. It parses to the same program.
     pub source: Cow<'static, str>,
-    /// Points, or the unknowns of a residual.
+    /// The unknowns, in declared order: points, or any others if the declaration is [mixed](Self::is_mixed).
     pub points: Cow<'static, [Field]>,
     /// Inputs of the rest shape.
     pub rest: Cow<'static, [Field]>,
     /// Parameters, without the stiffness and damping that every constraint has.
     pub parameters: Cow<'static, [Field]>,
-    /// Number of rows: 1 for an energy, the length of C or r, three per point for a force.
+    /// The state that an element keeps from step to step. It follows the parameters, and is read as they are.
+    pub state: Cow<'static, [Field]>,
+    /// Number of rows: 1 for an energy, the length of C or r, one per increment for a force.
     pub rows: usize,
     /// Claimed properties.
     pub properties: Cow<'static, [Property]>,
@@ -176,6 +205,28 @@ pub struct Declaration {
     pub primitives: Cow<'static, [&'static str]>,
     /// Routines and their costs.
     pub routines: Cow<'static, [Routine]>,
+}
+
+impl Declaration {
+    /// Returns whether some unknowns are not points in space that each element has of its own. Such an energy,
+    /// constraint or force has the traits of mixed unknowns. Residuals are not mixed: they have any unknowns.
+    #[must_use]
+    pub fn is_mixed(&self) -> bool {
+        let is_own_point = |field: &Field| field.kind == FieldKind::Point && field.size == 3 && !field.shared;
+        self.kind != Kind::Residual && !self.points.iter().all(is_own_point)
+    }
+
+    /// Returns the count of numbers that hold the unknowns.
+    #[must_use]
+    pub fn unknowns(&self) -> usize {
+        self.points.iter().map(|field| field.size).sum()
+    }
+
+    /// Returns the count of coordinates in which the unknowns move: the columns of derivatives.
+    #[must_use]
+    pub fn increments(&self) -> usize {
+        self.points.iter().map(Field::increments).sum()
+    }
 }
 
 #[cfg(test)]

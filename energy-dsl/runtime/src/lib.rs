@@ -22,20 +22,23 @@ pub use accumulate::Accumulate;
 pub use aligned::Aligned;
 pub use array::Array;
 pub use batch::{
-    BLOCK, Batch, BatchError, BatchWork, Batches, Flagged, Hessians, Packed, PackedForce, PackedPotential,
+    BLOCK, Batch, BatchError, BatchWork, Batches, Flagged, Hessians, Packed, PackedForce, PackedMixed, PackedPotential,
     PackedResidual, Stored, WidePoints, for_each_batch, for_each_batch_in,
 };
 #[doc(hidden)]
 pub use choose::Choose;
-pub use declaration::{Declaration, Field, Kind, OperationCount, Property, Routine, WeightedPoints};
+pub use declaration::{Declaration, Field, FieldKind, Kind, OperationCount, Property, Routine, WeightedPoints};
 pub use element::{
-    AnyElement, Block, Constraint, Element, ForceLaw, Inputs, Outputs, Potential, ReducedPotential, Residual,
-    RestError, Vector3, VertexPotential, triangle_index,
+    AnyElement, Block, Constraint, Element, ForceLaw, Inputs, MixedConstraint, MixedForce, MixedPotential, Outputs,
+    Potential, ReducedPotential, Residual, RestError, Stateful, Vector3, VertexPotential, triangle_index,
 };
 #[doc(hidden)]
 pub use element::{
     ConstraintHessianCall, ConstraintJacobianCall, ForceCall, GaussNewtonCall, GradientCall, HessianCall,
-    HessianVectorCall, JacobiansCall, ReducedHessianCall, ResidualCall, ResidualJacobianCall, ValueCall, VertexCall,
+    HessianVectorCall, JacobiansCall, MixedConstraintHessianCall, MixedConstraintJacobianCall, MixedForceCall,
+    MixedGaussNewtonCall, MixedGradientCall, MixedHessianCall, MixedJacobiansCall, MixedProductCall, MixedValueCall,
+    NextCall, NextJacobiansCall, ReducedHessianCall, ResidualCall, ResidualJacobianCall, StateJacobianCall, ValueCall,
+    VertexCall,
 };
 pub use evaluate::{evaluate_constraint, evaluate_force_law, evaluate_potential, evaluate_residual};
 pub use numbers::{
@@ -49,6 +52,8 @@ pub use numbers::{
 };
 pub use results::{
     ConstraintHessian, ConstraintJacobian, ForceJacobians, ForceValue, Gradient, Hessian, HessianVector,
-    ReducedHessian, ResidualJacobian, ResidualValue, Value, Vertex,
+    MixedConstraintHessian, MixedConstraintJacobian, MixedForceValue, MixedGradient, MixedHessian, MixedJacobians,
+    MixedProduct, NextJacobians, NextState, ReducedHessian, ResidualJacobian, ResidualValue, StateJacobian, Value,
+    Vertex,
 };
 pub use routine::RoutineKind;

@@ -138,3 +138,115 @@ pub struct ResidualJacobian<T: Number, Rows, Jacobian> {
     /// Flags of this evaluation.
     pub flags: Flags<T>,
 }
+
+/// Value and gradient of an energy of mixed unknowns.
+#[derive(Clone, Copy, Debug)]
+pub struct MixedGradient<T: Number, Increments> {
+    /// The energy U.
+    pub value: T,
+    /// ∂U/∂u, one number per increment, in declared order.
+    pub gradient: Increments,
+    /// Flags of this evaluation.
+    pub flags: Flags<T>,
+}
+
+/// Value, gradient and Hessian of an energy of mixed unknowns.
+#[derive(Clone, Copy, Debug)]
+pub struct MixedHessian<T: Number, Increments, Upper> {
+    /// The energy U.
+    pub value: T,
+    /// ∂U/∂u, one number per increment, in declared order.
+    pub gradient: Increments,
+    /// ∂²U/∂u², the upper triangle, row by row.
+    pub hessian: Upper,
+    /// Flags of this evaluation.
+    pub flags: Flags<T>,
+}
+
+/// The product of a Hessian of mixed unknowns with a vector.
+#[derive(Clone, Copy, Debug)]
+pub struct MixedProduct<T: Number, Increments> {
+    /// ∂²U/∂u² v, one number per increment.
+    pub product: Increments,
+    /// Flags of this evaluation.
+    pub flags: Flags<T>,
+}
+
+/// The value of a force law on mixed unknowns.
+#[derive(Clone, Copy, Debug)]
+pub struct MixedForceValue<T: Number, Increments> {
+    /// The force on each increment: a torque on a rotation.
+    pub force: Increments,
+    /// Flags of this evaluation.
+    pub flags: Flags<T>,
+}
+
+/// Value and Jacobians of a force law on mixed unknowns.
+#[derive(Clone, Copy, Debug)]
+pub struct MixedJacobians<T: Number, Increments, Square> {
+    /// The force on each increment: a torque on a rotation.
+    pub force: Increments,
+    /// ∂f/∂u, row by row: the plain derivative, which is not symmetric for rotations even if f has a potential.
+    pub by_position: Square,
+    /// ∂f/∂u̇, row by row.
+    pub by_velocity: Square,
+    /// Flags of this evaluation.
+    pub flags: Flags<T>,
+}
+
+/// Value and Jacobian of a constraint on mixed unknowns.
+#[derive(Clone, Copy, Debug)]
+pub struct MixedConstraintJacobian<T: Number, Rows, Jacobian> {
+    /// The constraint C, one number per row.
+    pub value: Rows,
+    /// ∂C/∂u, row by row, one number per increment.
+    pub jacobian: Jacobian,
+    /// Flags of this evaluation.
+    pub flags: Flags<T>,
+}
+
+/// Value, Jacobian and second derivatives of a constraint on mixed unknowns.
+#[derive(Clone, Copy, Debug)]
+pub struct MixedConstraintHessian<T: Number, Rows, Jacobian, Triangles> {
+    /// The constraint C, one number per row.
+    pub value: Rows,
+    /// ∂C/∂u, row by row, one number per increment.
+    pub jacobian: Jacobian,
+    /// ∂²C/∂u², one upper triangle per row of C, each row by row.
+    pub hessians: Triangles,
+    /// Flags of this evaluation.
+    pub flags: Flags<T>,
+}
+
+/// The state of an element after a step.
+#[derive(Clone, Copy, Debug)]
+pub struct NextState<T: Number, State> {
+    /// The new state, in declared order.
+    pub state: State,
+    /// Flags of this evaluation.
+    pub flags: Flags<T>,
+}
+
+/// The state of an element after a step, and its derivatives.
+#[derive(Clone, Copy, Debug)]
+pub struct NextJacobians<T: Number, State, ByUnknowns, ByState> {
+    /// The new state, in declared order.
+    pub state: State,
+    /// ∂(new state)/∂u, row by row, one number per increment of the unknowns.
+    pub by_unknowns: ByUnknowns,
+    /// ∂(new state)/∂(old state), row by row.
+    pub by_state: ByState,
+    /// Flags of this evaluation.
+    pub flags: Flags<T>,
+}
+
+/// The derivatives of an energy's gradient by the state.
+#[derive(Clone, Copy, Debug)]
+pub struct StateJacobian<T: Number, Increments, ByState> {
+    /// ∂U/∂u, one number per increment.
+    pub gradient: Increments,
+    /// ∂²U/∂u∂(state), row by row: one row per increment of the unknowns.
+    pub by_state: ByState,
+    /// Flags of this evaluation.
+    pub flags: Flags<T>,
+}

@@ -3,9 +3,9 @@
 use std::borrow::Cow::Borrowed;
 
 use energy_dsl::{
-    Block, Declaration, Element, Field, Flags, ForceJacobians, ForceLaw, ForceValue, Gradient, Hessian, Inputs, Kind,
-    Lane, Outputs, PackedPotential, Potential, Real, ReducedHessian, ReducedPotential, RestError, Stored, Value,
-    Vector3,
+    Block, Declaration, Element, Field, FieldKind, Flags, ForceJacobians, ForceLaw, ForceValue, Gradient, Hessian,
+    Inputs, Kind, Lane, Outputs, PackedPotential, Potential, Real, ReducedHessian, ReducedPotential, RestError, Stored,
+    Value, Vector3,
 };
 
 const fn declaration(
@@ -15,7 +15,8 @@ const fn declaration(
     rows: usize,
     quadratic: bool,
 ) -> Declaration {
-    const POINT: Field = Field { name: Borrowed("p"), size: 3, unit: Borrowed("m") };
+    const POINT: Field =
+        Field { name: Borrowed("p"), kind: FieldKind::Point, shared: false, size: 3, unit: Borrowed("m") };
     Declaration {
         name: Borrowed(name),
         kind,
@@ -25,6 +26,7 @@ const fn declaration(
         points: Borrowed(&[POINT, POINT]),
         rest: Borrowed(&[]),
         parameters: Borrowed(&[]),
+        state: Borrowed(&[]),
         rows,
         properties: Borrowed(&[]),
         translation_invariant: true,

@@ -35,7 +35,7 @@ pub(super) enum Meaning {
 /// Checks the expressions of one declaration. An invalid expression is reported once and yields `None`; its siblings
 /// are still checked.
 pub(super) struct Checker<'a> {
-    signature: &'a Signature,
+    pub(super) signature: &'a Signature,
     pub(super) functions: Vec<&'a UserFunction>,
     pub(super) diagnostics: &'a mut Diagnostics,
     /// Scopes: global constants, inputs, then bodies.
@@ -51,6 +51,8 @@ pub(super) struct Checker<'a> {
     pub(super) terms: usize,
     pub(super) bindings: Vec<Binding>,
     pub(super) reads_velocities: bool,
+    /// New values of the state, row by row.
+    pub(super) next: Option<Typed>,
     budget: &'a Budget,
     /// Whether the budget was spent or an expression too deep, which is reported once.
     spent: bool,
@@ -88,6 +90,7 @@ impl<'a> Checker<'a> {
             terms: 0,
             bindings: globals.bindings.clone(),
             reads_velocities: false,
+            next: None,
             budget,
             spent: false,
             level: 0,
@@ -131,12 +134,18 @@ impl<'a> Checker<'a> {
             self.define(&statement.name, value, statement.rest);
         }
         let result = self.expression(&body.result);
+        if let Some(next) = &body.next {
+            match outermost {
+                true => self.next = self.next_state(next),
+                false => drop(self.error(&next.span, "a `next` block stands in the outermost body only")),
+            }
+        }
         self.scopes.pop();
         self.functions.truncate(outer_functions);
         result
     }
 
-    fn define(&mut self, name: &Name, value: Option<Typed>, rest: bool) {
+    pub(super) fn define(&mut self, name: &Name, value: Option<Typed>, rest: bool) {
         let value = value.and_then(|value| self.check_depth(value));
         let meaning = value.map(|value| self.bind(value, rest));
         self.enter(name, meaning);
@@ -302,6 +311,12 @@ impl<'a> Checker<'a> {
     }
 
     fn input(&mut self, name: &Name, source: Source, first: usize, shape: Shape) -> Option<Typed> {
+        if self.in_rest && source == Source::Parameter && self.signature.is_state(first) {
+            let message = format!("`{}` changes from step to step, so the `rest` block cannot use it", name.text);
+            let help = "the rest block is computed once, from the rest shape and parameters";
+            self.diagnostics.push(Diagnostic::new(&name.span, message).help(help));
+            return None;
+        }
         match (source, self.in_rest) {
             (Source::Position | Source::Velocity, true) => {
                 let message = format!("`{}` moves, so the `rest` block cannot use it", name.text);

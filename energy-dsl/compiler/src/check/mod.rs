@@ -7,6 +7,7 @@ mod domain;
 mod equality;
 mod expression;
 mod names;
+mod next;
 mod remedy;
 mod result;
 mod signature;
@@ -101,19 +102,26 @@ fn check_declaration(
         checker.declaration = &declaration.name.text;
         let result = checker.body(body, true).and_then(|result| checker.check_depth(result))?;
         checker.report_unused(&declaration.name);
-        let bindings = checker.bindings;
-        let has_velocities = checker.reads_velocities;
-        Some((bindings, has_velocities, result))
+        let (bindings, has_velocities, next) = (checker.bindings, checker.reads_velocities, checker.next);
+        Some((bindings, has_velocities, result, next))
     });
-    let checked = checked.and_then(|(bindings, has_velocities, result)| {
+    let checked = checked.and_then(|(bindings, has_velocities, result, next)| {
         let body = declaration.body.as_ref()?;
         let result = result::expected(declaration, &signature, result, &body.result.span, &mut own)?;
-        own.0.is_empty().then_some((bindings, has_velocities, result))
+        next::check_presence(declaration, &signature, body, &mut own);
+        own.0.is_empty().then_some((bindings, has_velocities, result, next))
     });
     let failed = checked.is_none();
     diagnostics.append(own);
-    let (bindings, has_velocities, result) = checked
-        .unwrap_or_else(|| (Vec::new(), false, result::stub(declaration.kind, &signature, &declaration.name.span)));
+    let (bindings, has_velocities, result, next) = checked.unwrap_or_else(|| {
+        let span = &declaration.name.span;
+        let size = signature.parameters[signature.parameters.len() - signature.states..]
+            .iter()
+            .map(|input| input.input_type.size())
+            .sum::<usize>();
+        let next = (size > 0).then(|| result::zeros(size, span));
+        (Vec::new(), false, result::stub(declaration.kind, &signature, span), next)
+    });
     let program = Program {
         name: declaration.name.text.clone(),
         span: declaration.name.span.clone(),
@@ -130,6 +138,8 @@ fn check_declaration(
         moving: signature.moving,
         rest: signature.rest,
         parameters: signature.parameters,
+        states: signature.states,
+        next,
         has_velocities,
         bindings,
         result,

@@ -111,6 +111,13 @@ impl<'a> Names<'a, '_> {
             self.define(&statement.name, Role::Value);
         }
         self.expression(&body.result);
+        if let Some(next) = &body.next {
+            for statement in &next.lets {
+                self.expression(&statement.value);
+                self.define(&statement.name, Role::Value);
+            }
+            next.assignments.iter().for_each(|assignment| self.expression(&assignment.value));
+        }
         self.close();
     }
 
@@ -250,7 +257,8 @@ pub(super) fn mentioned(item: &Item) -> BTreeSet<String> {
 fn mentioned_in_body(body: &Body, found: &mut BTreeSet<String>) {
     body.constants.iter().for_each(|constant| mentioned_in(&constant.value, found));
     body.functions.iter().for_each(|function| mentioned_in_body(&function.body, found));
-    body.lets.iter().for_each(|statement| mentioned_in(&statement.value, found));
+    let of_next = body.next.iter().flat_map(|next| next.lets.iter().chain(&next.assignments));
+    body.lets.iter().chain(of_next).for_each(|statement| mentioned_in(&statement.value, found));
     mentioned_in(&body.result, found);
 }
 

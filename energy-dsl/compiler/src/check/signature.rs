@@ -3,14 +3,17 @@ use super::expression::Checker;
 use super::typed::{Input, Source};
 use crate::diagnostic::{Diagnostic, Diagnostics};
 use crate::functions::Shape;
-use crate::syntax::{Declaration, ElementType, InputGroup, InputType, Name, Section, Unit};
+use crate::syntax::{Declaration, ElementType, InputGroup, InputType, Name, Section};
 use energy_runtime::Kind;
 
 /// The numbered inputs of a declaration, and their names.
 pub(super) struct Signature {
     pub(super) moving: Vec<Input>,
     pub(super) rest: Vec<Input>,
+    /// Parameters, and then the state.
     pub(super) parameters: Vec<Input>,
+    /// Number of inputs at the end of the parameters that are the state.
+    pub(super) states: usize,
     pub(super) names: Vec<InputName>,
 }
 
@@ -25,47 +28,40 @@ pub(super) struct InputName {
     pub(super) shape: Shape,
     /// Length of the array; `None` if the input is not an array.
     pub(super) length: Option<usize>,
+    /// Whether it is part of the state.
+    pub(super) is_state: bool,
 }
 
 impl Signature {
     /// Creates a signature without inputs.
     pub(super) fn empty() -> Self {
-        Self { moving: Vec::new(), rest: Vec::new(), parameters: Vec::new(), names: Vec::new() }
+        Self { moving: Vec::new(), rest: Vec::new(), parameters: Vec::new(), states: 0, names: Vec::new() }
+    }
+
+    /// Returns whether the parameter that begins with this number is part of the state.
+    pub(super) fn is_state(&self, first: usize) -> bool {
+        let own = self.parameters.len() - self.states;
+        self.parameters.get(own).is_some_and(|state| first >= state.first)
     }
 
     pub(super) fn of(declaration: &Declaration, globals: &Globals, diagnostics: &mut Diagnostics) -> Self {
         let mut signature = Self::empty();
         let mut velocities = 0;
-        for group in &declaration.inputs {
-            let points_move = declaration.kind != Kind::Residual;
-            if group.section == Section::Moving
-                && points_move
-                && !matches!(group.element, ElementType::Point | ElementType::Velocity)
-            {
-                diagnostics.push(
-                    Diagnostic::new(
-                        &group.type_span,
-                        format!(
-                            "expected Point: the inputs of this {} before the first `;` are \
-                            points",
-                            declaration.kind.keyword()
-                        ),
-                    )
-                    .help("put parameters after the first `;`, as in (p0, p1: Point; k: Scalar)"),
-                );
-            }
-            if group.element == ElementType::Velocity && declaration.kind != Kind::Force {
-                diagnostics.push(Diagnostic::new(
-                    &group.type_span,
-                    format!("this {} cannot depend on velocities; declare a force", declaration.kind.keyword()),
-                ));
-            }
-            let input_type = input_type(group, &declaration.name.text, globals, diagnostics);
-            // Each has at least one number, so that this error is certain.
-            for name in group.names.iter().take(MOST_NUMBERS + 1 - signature.names.len().min(MOST_NUMBERS)) {
-                signature.add(name, group.section, input_type, &group.unit, &mut velocities, diagnostics);
-            }
+        let groups = |state: bool| declaration.inputs.iter().filter(move |g| (g.section == Section::State) == state);
+        for group in groups(false) {
+            check_group(declaration, group, diagnostics);
+            signature.add_group(declaration, group, globals, &mut velocities, diagnostics);
         }
+        if declaration.kind == Kind::Constraint {
+            signature.add_implied(declaration);
+        }
+        let own = signature.parameters.len();
+        for group in groups(true) {
+            check_group(declaration, group, diagnostics);
+            signature.add_group(declaration, group, globals, &mut velocities, diagnostics);
+        }
+        signature.states = signature.parameters.len() - own;
+        signature.assign_velocities(velocities, diagnostics);
         let numbers = |list: &[Input]| list.iter().map(|i| i.input_type.size()).sum::<usize>();
         if [&signature.moving, &signature.rest, &signature.parameters]
             .into_iter()
@@ -91,34 +87,78 @@ impl Signature {
                 .help("name them first, as in (p0, p1: Point; k: Scalar)"),
             );
         }
-        if velocities > signature.moving.len() {
-            diagnostics.push(Diagnostic::new(
-                &declaration.name.span,
-                format!("{velocities} velocities for {} points: expected at most one each", signature.moving.len()),
-            ));
-        }
-        if declaration.kind == Kind::Constraint {
-            let span = declaration.name.span.clone();
-            for implied in ["stiffness", "damping"] {
-                let name = Name { text: implied.into(), span: span.clone() };
-                let scalar = InputType { element: ElementType::Scalar, length: None };
-                signature.add(&name, Section::Parameter, scalar, &Unit::default(), &mut velocities, diagnostics);
-                // The formula cannot use it, so it is not nameable.
-                signature.names.pop();
-            }
-        }
         signature
+    }
+
+    fn add_group(
+        &mut self,
+        declaration: &Declaration,
+        group: &InputGroup,
+        globals: &Globals,
+        velocities: &mut usize,
+        diagnostics: &mut Diagnostics,
+    ) {
+        let input_type = input_type(group, &declaration.name.text, globals, diagnostics);
+        // Each has at least one number, so that this error is certain.
+        for name in group.names.iter().take(MOST_NUMBERS + 1 - self.names.len().min(MOST_NUMBERS)) {
+            self.add(name, group, input_type, velocities, diagnostics);
+        }
+    }
+
+    /// Gives each velocity to the unknown with its number. Velocities are numbered by increments.
+    fn assign_velocities(&mut self, velocities: usize, diagnostics: &mut Diagnostics) {
+        let mut firsts = Vec::with_capacity(self.moving.len());
+        let mut next = 0;
+        for input in &self.moving {
+            let increments = input.input_type.element.increments();
+            firsts.push((next, increments));
+            next += increments;
+        }
+        for name in self.names.iter_mut().filter(|name| name.source == Source::Velocity) {
+            let number = name.first / 3;
+            let given = &firsts[firsts.len().min(number)..firsts.len().min(number + name.length.unwrap_or(1))];
+            if given.len() < name.length.unwrap_or(1) {
+                let message = format!("{velocities} velocities for {} points: expected at most one each", firsts.len());
+                diagnostics.push(Diagnostic::new(&name.name.span, message));
+                return;
+            }
+            if let Some(other) = given.iter().position(|(_, increments)| *increments != 3) {
+                let of = &self.moving[number + other].name;
+                let message =
+                    format!("`{}` would be the velocity of `{of}`, which is no point or rotation", name.name.text);
+                let help = "velocities belong to the unknowns in declared order: put points and rotations first";
+                diagnostics.push(Diagnostic::new(&name.name.span, message).help(help));
+                return;
+            }
+            name.first = given.first().map_or(0, |(first, _)| *first);
+        }
+    }
+
+    /// Adds the stiffness and the damping of a constraint. The formula cannot use them, so they have no names there.
+    fn add_implied(&mut self, declaration: &Declaration) {
+        for implied in ["stiffness", "damping"] {
+            let first = self.parameters.last().map_or(0, |i: &Input| i.first + i.input_type.size());
+            self.parameters.push(Input {
+                name: implied.into(),
+                input_type: InputType { element: ElementType::Scalar, length: None },
+                unit: String::new(),
+                span: declaration.name.span.clone(),
+                first,
+                shared: false,
+            });
+        }
     }
 
     fn add(
         &mut self,
         name: &Name,
-        section: Section,
+        group: &InputGroup,
         input_type: InputType,
-        unit: &Unit,
         velocities: &mut usize,
         diagnostics: &mut Diagnostics,
     ) {
+        let InputGroup { section, shared, unit, .. } = group;
+        let section = *section;
         let canonical = name.canonical();
         let clash = self.names.iter().find(|n| n.canonical == canonical);
         if let Some(other) = clash {
@@ -137,7 +177,7 @@ impl Signature {
                     .help("rename it"),
             );
         }
-        let (shape, length) = (shape(input_type.element), input_type.length);
+        let (shape, length) = (shape_of(input_type.element), input_type.length);
         let (source, first) = if is_velocity {
             *velocities += length.unwrap_or(1);
             (Source::Velocity, 3 * (*velocities - length.unwrap_or(1)))
@@ -145,14 +185,14 @@ impl Signature {
             let (source, list) = match section {
                 Section::Moving => (Source::Position, &mut self.moving),
                 Section::Rest => (Source::Rest, &mut self.rest),
-                Section::Parameter => (Source::Parameter, &mut self.parameters),
+                Section::Parameter | Section::State => (Source::Parameter, &mut self.parameters),
             };
             let first = list.last().map_or(0, |i: &Input| i.first + i.input_type.size());
             let span = unit.span.as_ref().unwrap_or(&name.span).clone();
             // The stub of a broken declaration must be valid Rust.
             let suffix = if stored && reserved(&name.text).is_some() { "_" } else { "" };
-            let input =
-                Input { name: format!("{}{suffix}", name.text), input_type, unit: unit.text.clone(), span, first };
+            let (name, unit, shared) = (format!("{}{suffix}", name.text), unit.text.clone(), *shared);
+            let input = Input { name, input_type, unit, span, first, shared };
             match length.filter(|_| section == Section::Moving) {
                 // Moving inputs are listed entry by entry.
                 Some(length) => list.extend((0..length).map(|i| entry(&input, i))),
@@ -160,8 +200,39 @@ impl Signature {
             }
             (source, first)
         };
-        self.names.push(InputName { name: name.clone(), canonical, source, first, shape, length });
+        let is_state = section == Section::State;
+        self.names.push(InputName { name: name.clone(), canonical, source, first, shape, length, is_state });
     }
+}
+
+/// Checks the types of a group of inputs.
+fn check_group(declaration: &Declaration, group: &InputGroup, diagnostics: &mut Diagnostics) {
+    let kind = declaration.kind.keyword();
+    let mut report = |message: String, help: &str| {
+        diagnostics.push(Diagnostic::new(&group.type_span, message).help(help.to_owned()));
+    };
+    let is_unknown = group.section == Section::Moving && group.element != ElementType::Velocity;
+    if is_unknown && declaration.kind != Kind::Residual && !moves_by_numbers(group.element) {
+        let message = format!("an unknown of this {kind} cannot have this type");
+        let help = "unknowns are Scalar, Vec2, Vec3, Vec4, Point, Point2, Rotation and arrays of them; parameters \
+                    follow the first `;`, as in (p0, p1: Point; k: Scalar)";
+        report(message, help);
+    }
+    if group.shared && !is_unknown {
+        report("only unknowns can be `shared`".into(), "put it before the first `;`, or leave out `shared`");
+    }
+    if group.element == ElementType::Velocity && declaration.kind != Kind::Force {
+        diagnostics.push(Diagnostic::new(
+            &group.type_span,
+            format!("this {kind} cannot depend on velocities; declare a force"),
+        ));
+    }
+}
+
+/// Returns whether an unknown of this type moves by three numbers or fewer that are added, or by a rotation.
+fn moves_by_numbers(element: ElementType) -> bool {
+    use ElementType::{Point, Point2, Rotation, Scalar, Vector};
+    matches!(element, Scalar | Vector(_) | Point | Point2 | Rotation)
 }
 
 /// Maximum count of numbers in an input; more are data.
@@ -188,13 +259,15 @@ fn entry(array: &Input, number: usize) -> Input {
     Input { name: format!("{}[{number}]", array.name), input_type, first, ..array.clone() }
 }
 
-fn shape(element: ElementType) -> Shape {
+/// Returns the shape of an input, or of the entries of an array.
+pub(super) fn shape_of(element: ElementType) -> Shape {
     match element {
         ElementType::Point | ElementType::Velocity => Shape::Vector(3),
+        ElementType::Point2 => Shape::Vector(2),
         ElementType::Scalar => Shape::Scalar,
         ElementType::Vector(n) => Shape::Vector(n),
         ElementType::Matrix(rows, columns) => Shape::Matrix(rows, columns),
-        ElementType::Quat => Shape::Quat,
+        ElementType::Quat | ElementType::Rotation => Shape::Quat,
         ElementType::DualQuat => Shape::DualQuat,
         ElementType::Twist => Shape::Twist,
     }

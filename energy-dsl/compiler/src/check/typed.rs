@@ -1,7 +1,7 @@
 use crate::budget::{Budget, Limits, Stop};
 use crate::diagnostic::{Diagnostic, Span};
 use crate::functions::{Function, Shape};
-use crate::syntax::{AuditScope, InputType, Unit};
+use crate::syntax::{AuditScope, ElementType, InputType, Unit};
 use energy_runtime::{Kind, Property};
 
 /// A checked declaration.
@@ -35,8 +35,12 @@ pub struct Program {
     pub moving: Vec<Input>,
     /// Inputs of the rest shape.
     pub rest: Vec<Input>,
-    /// Parameters, in the order of the declaration. Those of a constraint end with stiffness and damping.
+    /// Parameters, in the order of the declaration, stiffness and damping of a constraint, and the state.
     pub parameters: Vec<Input>,
+    /// Number of inputs at the end of the parameters that are the state.
+    pub states: usize,
+    /// New values of the state, row by row; `None` without a state.
+    pub next: Option<Typed>,
     /// Whether the body reads velocities.
     pub has_velocities: bool,
     /// Intermediate values and constants, in order.
@@ -72,10 +76,11 @@ impl Program {
     pub(crate) fn stub(&self) -> Self {
         let zero = |span: &Span| super::expression::constant(0.0, span);
         let result = match self.kind {
-            Kind::Force => super::result::no_forces(self.points(), &self.span),
+            Kind::Force => super::result::no_forces(&self.moving, &self.span),
             _ => zero(&self.span),
         };
-        let stub = Self { bindings: Vec::new(), result, budget: Budget::new(Limits::NONE), ..self.clone() };
+        let next = self.next.as_ref().map(|_| super::result::zeros(self.state_size(), &self.span));
+        let stub = Self { bindings: Vec::new(), result, next, budget: Budget::new(Limits::NONE), ..self.clone() };
         stub.without_audit()
     }
 
@@ -83,6 +88,32 @@ impl Program {
     #[must_use]
     pub fn points(&self) -> usize {
         self.moving.len()
+    }
+
+    /// Returns whether some moving inputs are not points in space that each element has of its own; false for a
+    /// residual. See [`energy_runtime::Declaration::is_mixed`].
+    #[must_use]
+    pub fn is_mixed(&self) -> bool {
+        let is_own_point = |input: &Input| input.input_type.element == ElementType::Point && !input.shared;
+        self.kind != Kind::Residual && !self.moving.iter().all(is_own_point)
+    }
+
+    /// Returns the inputs that are the state.
+    #[must_use]
+    pub fn state(&self) -> &[Input] {
+        &self.parameters[self.parameters.len() - self.states..]
+    }
+
+    /// Returns the count of numbers of the state.
+    #[must_use]
+    pub fn state_size(&self) -> usize {
+        self.state().iter().map(|input| input.input_type.size()).sum()
+    }
+
+    /// Returns the count of coordinates in which the moving inputs move.
+    #[must_use]
+    pub fn increments(&self) -> usize {
+        self.moving.iter().map(|input| input.input_type.element.increments()).sum()
     }
 
     /// Removes the audit test, which would report a broken declaration a second time.
@@ -123,6 +154,8 @@ pub struct Input {
     pub span: Span,
     /// Index of the first component within its section.
     pub first: usize,
+    /// Whether it is one unknown for all elements.
+    pub shared: bool,
 }
 
 /// An intermediate value.

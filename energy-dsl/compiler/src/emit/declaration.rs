@@ -20,7 +20,8 @@ pub(super) fn declaration(declaration: &Declaration) -> TokenStream {
     let properties = declaration.properties.iter().map(|property| format_ident!("{property:?}"));
     let list = declaration.routines.iter().map(routine);
     let [name, docs, formula, source] = [name, docs, formula, source].map(|text| borrowed(&**text));
-    let [points, rest, parameters] = [&declaration.points, &declaration.rest, &declaration.parameters].map(|fields| {
+    let Declaration { points, rest, parameters, state, .. } = declaration;
+    let [points, rest, parameters, state] = [points, rest, parameters, state].map(|fields| {
         let fields = fields.iter().map(field);
         borrowed(quote!(&[#(#fields)*]))
     });
@@ -38,6 +39,7 @@ pub(super) fn declaration(declaration: &Declaration) -> TokenStream {
             points: #points,
             rest: #rest,
             parameters: #parameters,
+            state: #state,
             rows: #rows,
             properties: #properties,
             translation_invariant: #translation_invariant,
@@ -61,8 +63,17 @@ fn borrowed(constant: impl ToTokens) -> TokenStream {
 
 fn field(field: &Field) -> TokenStream {
     let [name, unit] = [&field.name, &field.unit].map(|text| borrowed(&**text));
-    let size = field.size;
-    quote!(::energy_dsl::Field { name: #name, size: #size, unit: #unit },)
+    let Field { kind, shared, size, .. } = field;
+    let kind = format_ident!("{kind:?}");
+    quote! {
+        ::energy_dsl::Field {
+            name: #name,
+            kind: ::energy_dsl::FieldKind::#kind,
+            shared: #shared,
+            size: #size,
+            unit: #unit,
+        },
+    }
 }
 
 fn routine(routine: &Routine) -> TokenStream {

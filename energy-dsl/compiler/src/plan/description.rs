@@ -11,7 +11,7 @@ use energy_runtime::{Declaration, Field, Kind, Routine, RoutineKind};
 pub(super) fn description(program: &Program, routines: &Routines) -> Declaration {
     // The stiffness and damping of a constraint are implied by its kind.
     let implied = if program.kind == Kind::Constraint { 2 } else { 0 };
-    let declared = &program.parameters[..program.parameters.len() - implied];
+    let declared = &program.parameters[..program.parameters.len() - program.states - implied];
     let docs: Vec<&str> = program.docs.iter().map(|line| line.strip_prefix(' ').unwrap_or(line)).collect();
     let Character { curved, quadratic, velocity_dependent, symmetric } = character(program, routines);
     let list = routines.all().map(|(graph, routine)| Routine {
@@ -28,6 +28,7 @@ pub(super) fn description(program: &Program, routines: &Routines) -> Declaration
         points: fields(&program.moving),
         rest: fields(&program.rest),
         parameters: fields(declared),
+        state: fields(program.state()),
         rows: program.rows(),
         properties: program.properties.iter().map(|(property, _)| *property).collect(),
         translation_invariant: routines.translation_invariant,
@@ -46,6 +47,8 @@ pub(super) fn description(program: &Program, routines: &Routines) -> Declaration
 fn fields(inputs: &[Input]) -> Cow<'static, [Field]> {
     let field = |input: &Input| Field {
         name: Cow::Owned(input.name.clone()),
+        kind: input.input_type.element.field_kind(),
+        shared: input.shared,
         size: input.input_type.size(),
         unit: Cow::Owned(input.unit.clone()),
     };

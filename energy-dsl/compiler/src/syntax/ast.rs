@@ -2,7 +2,7 @@ use super::name::Name;
 use super::specialise::Specialisation;
 use crate::budget::Limits;
 use crate::diagnostic::Span;
-use energy_runtime::{Kind, Property};
+use energy_runtime::{FieldKind, Kind, Property};
 
 /// A declaration, a function or a constant.
 #[derive(Clone, Debug)]
@@ -101,6 +101,8 @@ pub enum Section {
     Rest,
     /// After the first semicolon, without the word `rest`.
     Parameter,
+    /// Marked with the word `state`.
+    State,
 }
 
 /// Type of an input, or of the entries of an array.
@@ -108,6 +110,8 @@ pub enum Section {
 pub enum ElementType {
     /// A point in space.
     Point,
+    /// A point in a plane.
+    Point2,
     /// The velocity of the point with the same number.
     Velocity,
     /// A single number, without components.
@@ -118,6 +122,8 @@ pub enum ElementType {
     Matrix(u8, u8),
     /// A quaternion: w, x, y, z.
     Quat,
+    /// A rotation, a unit quaternion: w, x, y, z.
+    Rotation,
     /// A dual quaternion: real part, then dual part, each w, x, y, z.
     DualQuat,
     /// A rotation vector θ, then a translation t.
@@ -130,10 +136,11 @@ impl ElementType {
     pub fn dimensions(self) -> Vec<usize> {
         match self {
             Self::Point | Self::Velocity => vec![3],
+            Self::Point2 => vec![2],
             Self::Scalar => vec![],
             Self::Vector(n) => vec![n.into()],
             Self::Matrix(rows, columns) => vec![rows.into(), columns.into()],
-            Self::Quat => vec![4],
+            Self::Quat | Self::Rotation => vec![4],
             Self::DualQuat => vec![8],
             Self::Twist => vec![6],
         }
@@ -143,6 +150,22 @@ impl ElementType {
     #[must_use]
     pub fn size(self) -> usize {
         self.dimensions().into_iter().product()
+    }
+
+    /// Returns how an input of this type moves.
+    #[must_use]
+    pub const fn field_kind(self) -> FieldKind {
+        match self {
+            Self::Point | Self::Point2 => FieldKind::Point,
+            Self::Rotation => FieldKind::Rotation,
+            _ => FieldKind::Numbers,
+        }
+    }
+
+    /// Returns the number of coordinates in which an unknown of this type moves.
+    #[must_use]
+    pub fn increments(self) -> usize {
+        if self == Self::Rotation { 3 } else { self.size() }
     }
 }
 
@@ -174,6 +197,8 @@ impl InputType {
 pub struct InputGroup {
     /// Section of the signature.
     pub section: Section,
+    /// Whether all elements share these unknowns.
+    pub shared: bool,
     /// Names of the inputs.
     pub names: Vec<Name>,
     /// Type of the inputs, or of the entries of arrays.
@@ -230,6 +255,8 @@ pub struct Body {
     pub functions: Vec<UserFunction>,
     /// `let` bindings in order.
     pub lets: Vec<Let>,
+    /// The block `next { … }`.
+    pub next: Option<Next>,
     /// Result of the body.
     pub result: Box<Expression>,
 }
@@ -245,11 +272,22 @@ pub struct Let {
     pub rest: bool,
 }
 
+/// `next { … }`: the state after an accepted step.
+#[derive(Clone, Debug)]
+pub struct Next {
+    /// Values that only the block knows.
+    pub lets: Vec<Let>,
+    /// New values, by the names of the states.
+    pub assignments: Vec<Let>,
+    /// Place of the word `next`.
+    pub span: Span,
+}
+
 impl Body {
     /// Creates a body without statements.
     #[must_use]
     pub fn of(result: Expression) -> Self {
-        Self { constants: Vec::new(), functions: Vec::new(), lets: Vec::new(), result: Box::new(result) }
+        Self { constants: Vec::new(), functions: Vec::new(), lets: Vec::new(), next: None, result: Box::new(result) }
     }
 }
 

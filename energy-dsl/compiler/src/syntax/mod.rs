@@ -14,7 +14,7 @@ mod tokens;
 
 pub use ast::{
     AuditRange, AuditScope, Body, Constant, Declaration, ElementType, Expression, ExpressionKind, InputGroup,
-    InputType, Item, Section, Sum, Unit, UserFunction,
+    InputType, Item, Let, Next, Section, Sum, Unit, UserFunction,
 };
 pub use name::{Name, canonical};
 pub(crate) use notation::without_hat;

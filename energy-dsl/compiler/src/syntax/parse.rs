@@ -3,7 +3,7 @@
 use proc_macro2::TokenStream;
 
 use super::ast::{
-    Body, Constant, Declaration, ElementType, Expression, ExpressionKind, InputGroup, Item, Let, Section, Unit,
+    Body, Constant, Declaration, ElementType, Expression, ExpressionKind, InputGroup, Item, Let, Next, Section, Unit,
     UserFunction,
 };
 use super::attribute::Attributes;
@@ -98,6 +98,7 @@ pub(super) struct Parser<'a> {
 const KINDS: [Kind; 4] = [Kind::Energy, Kind::Constraint, Kind::Force, Kind::Residual];
 const TYPES: &[(&str, ElementType)] = &[
     ("Point", ElementType::Point),
+    ("Point2", ElementType::Point2),
     ("Velocity", ElementType::Velocity),
     ("Scalar", ElementType::Scalar),
     ("Vec2", ElementType::Vector(2)),
@@ -109,6 +110,7 @@ const TYPES: &[(&str, ElementType)] = &[
     ("Mat3x3", ElementType::Matrix(3, 3)),
     ("Mat4x4", ElementType::Matrix(4, 4)),
     ("Quat", ElementType::Quat),
+    ("Rotation", ElementType::Rotation),
     ("DualQuat", ElementType::DualQuat),
     ("Twist", ElementType::Twist),
 ];
@@ -370,8 +372,9 @@ impl<'a> Parser<'a> {
         self.expect("(", "and the inputs, as in (p0, p1: Point; k: Scalar[N/m])")?;
         let mut groups = Vec::new();
         let mut section = Section::Moving;
-        let mut rest = self.take_word("rest");
+        let mut marked = self.section_word();
         while !self.take(")") {
+            let shared = self.take_word_before_name("shared");
             let mut names = vec![self.name("the name of an input")?];
             while self.take(",") {
                 names.push(self.name("the name of an input")?);
@@ -379,16 +382,32 @@ impl<'a> Parser<'a> {
             self.expect(":", "and the type of the input")?;
             let type_span = self.span();
             let (element, unit, length) = self.input_type()?;
-            let place = if rest { Section::Rest } else { section_of(section, element) };
-            groups.push(InputGroup { section: place, names, element, length, type_span, unit });
+            let section_here = marked.unwrap_or_else(|| section_of(section, element));
+            groups.push(InputGroup { section: section_here, shared, names, element, length, type_span, unit });
             if self.take(";") {
                 section = Section::Parameter;
-                rest = self.take_word("rest");
+                marked = self.section_word();
             } else if !self.take(",") && !self.is(")") {
                 return self.fail("`,`, `;` or `)` after an input");
             }
         }
         Ok(groups)
+    }
+
+    /// Parses the word that marks the inputs up to the next `;`.
+    fn section_word(&mut self) -> Option<Section> {
+        if self.take_word("rest") {
+            return Some(Section::Rest);
+        }
+        self.take_word_before_name("state").then_some(Section::State)
+    }
+
+    /// Takes a word that is also a legal name, if another name follows it.
+    fn take_word_before_name(&mut self, word: &str) -> bool {
+        let names_follow = matches!(self.tokens.get(self.at + 1), Some(Token { kind: TokenKind::Name(_), .. }));
+        let found = self.is_word(word) && names_follow;
+        self.at += usize::from(found);
+        found
     }
 
     /// Parses `Type[unit]` or `[Type[unit]; length]`.
@@ -498,7 +517,12 @@ impl<'a> Parser<'a> {
     pub(super) fn body(&mut self, braced: bool) -> Parsed<Body> {
         let mut constants = Vec::new();
         let mut body = (Vec::new(), Vec::new());
+        let mut next = None;
         loop {
+            if braced && let Some(block) = self.next_block(next.is_some())? {
+                next = Some(block);
+                continue;
+            }
             if self.take_word("fn") {
                 body.0.push(self.user_function()?);
             } else if self.take_word("const") {
@@ -533,7 +557,38 @@ impl<'a> Parser<'a> {
                     .help("put the result last, without `;`; name intermediate values with `let name = …;`"),
             ));
         }
-        Ok(Body { constants, functions: body.0, lets: body.1, result: Box::new(result) })
+        if braced && let Some(block) = self.next_block(next.is_some())? {
+            next = Some(block);
+        }
+        Ok(Body { constants, functions: body.0, lets: body.1, next, result: Box::new(result) })
+    }
+
+    /// Parses `next { a = …; … }`, if it is here.
+    fn next_block(&mut self, is_second: bool) -> Parsed<Option<Next>> {
+        if !self.is_word("next") || self.tokens.get(self.at + 1).is_none_or(|token| token.text != "{") {
+            return Ok(None);
+        }
+        let span = self.span();
+        if is_second {
+            return Err(Box::new(
+                Diagnostic::new(&span, "a body has one `next` block").help("put all new states into it"),
+            ));
+        }
+        self.at += 2;
+        let mut next = Next { lets: Vec::new(), assignments: Vec::new(), span };
+        while !self.take("}") {
+            if self.is_word("let") {
+                next.lets.push(self.statement(false)?);
+                continue;
+            }
+            self.count_definition()?;
+            let name = self.name("the name of a state, as in next { a = b; }, or `let`")?;
+            self.expect("=", "and the new value of the state")?;
+            let value = self.expression()?;
+            self.expect(";", "after the new value")?;
+            next.assignments.push(Let { name, value, rest: false });
+        }
+        Ok(Some(next))
     }
 
     fn next_is_definition(&self) -> bool {

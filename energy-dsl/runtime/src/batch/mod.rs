@@ -13,5 +13,5 @@ mod residuals;
 mod tests;
 
 pub use error::{BatchError, Flagged};
-pub use packed::{BLOCK, Packed, PackedForce, PackedPotential, PackedResidual, Stored, WidePoints};
+pub use packed::{BLOCK, Packed, PackedForce, PackedMixed, PackedPotential, PackedResidual, Stored, WidePoints};
 pub use potentials::{Batch, BatchWork, Batches, Hessians, for_each_batch, for_each_batch_in};

@@ -6,7 +6,7 @@ use std::ops::Range;
 use super::error::BatchError;
 use crate::aligned::Aligned;
 use crate::array::Array;
-use crate::element::{Element, ForceLaw, Potential, ReducedPotential, Residual, Vector3};
+use crate::element::{Element, ForceLaw, MixedPotential, Potential, ReducedPotential, Residual, Vector3};
 use crate::numbers::{Lane, Real};
 
 /// Elements in a packed block: the number of `f32` lanes in the widest register.
@@ -46,6 +46,10 @@ packed!(
 packed!(
     /// Residuals that run over lanes.
     PackedResidual: Residual, Residual
+);
+packed!(
+    /// Potentials of mixed unknowns that run over lanes.
+    PackedMixed: MixedPotential, MixedPotential
 );
 
 /// The points of a potential over lanes `V`.

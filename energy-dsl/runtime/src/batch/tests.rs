@@ -27,6 +27,7 @@ static SPRING: Declaration = Declaration {
     points: Cow::Borrowed(&[]),
     rest: Cow::Borrowed(&[]),
     parameters: Cow::Borrowed(&[]),
+    state: Cow::Borrowed(&[]),
     rows: 1,
     properties: Cow::Borrowed(&[]),
     translation_invariant: true,

@@ -4,12 +4,17 @@
 //! retire (failed store forwarding), so the points are read one number at a time, too.
 
 use crate::array::Array;
-use crate::element::{Constraint, ForceLaw, Potential, ReducedPotential, Residual, Vector3, VertexPotential};
+use crate::element::{
+    Constraint, ForceLaw, MixedConstraint, MixedForce, MixedPotential, Potential, ReducedPotential, Residual, Stateful,
+    Vector3, VertexPotential,
+};
 use crate::numbers::Real;
 use crate::numbers::{Kernel, Level, read_alone};
 use crate::results::{
     ConstraintHessian, ConstraintJacobian, ForceJacobians, ForceValue, Gradient, Hessian, HessianVector,
-    ReducedHessian, ResidualJacobian, ResidualValue, Value, Vertex,
+    MixedConstraintHessian, MixedConstraintJacobian, MixedForceValue, MixedGradient, MixedHessian, MixedJacobians,
+    MixedProduct, NextJacobians, NextState, ReducedHessian, ResidualJacobian, ResidualValue, StateJacobian, Value,
+    Vertex,
 };
 
 /// Declares a kernel that holds an element and the arguments of one routine.
@@ -70,6 +75,30 @@ call!(ConstraintHessianCall: Constraint,
 call!(GaussNewtonCall: Constraint, gauss_newton_at(1 vectors Points<E, T>) -> Hessian<T, Points<E, T>, E::Triangle>);
 call!(ResidualCall: Residual, residual_at(1 numbers E::Unknowns) -> ResidualValue<T, E::Rows>);
 call!(ResidualJacobianCall: Residual, jacobian_at(1 numbers E::Unknowns) -> ResidualJacobian<T, E::Rows, E::Jacobian>);
+type Unknowns<E, T> = <E as MixedPotential<T>>::Unknowns;
+type Increments<E, T> = <E as MixedPotential<T>>::Increments;
+
+call!(MixedValueCall: MixedPotential, value_at(1 numbers E::Unknowns) -> Value<T>);
+call!(MixedGradientCall: MixedPotential, gradient_at(1 numbers E::Unknowns) -> MixedGradient<T, E::Increments>);
+call!(MixedHessianCall: MixedPotential,
+    hessian_at(1 numbers E::Unknowns) -> MixedHessian<T, E::Increments, E::Upper>);
+call!(MixedProductCall: MixedPotential,
+    hessian_vector_at(1 numbers E::Unknowns, 2 numbers E::Increments) -> MixedProduct<T, E::Increments>);
+call!(MixedForceCall: MixedForce,
+    force_at(1 numbers E::Unknowns, 2 numbers E::Increments) -> MixedForceValue<T, E::Increments>);
+call!(MixedJacobiansCall: MixedForce,
+    jacobians_at(1 numbers E::Unknowns, 2 numbers E::Increments) -> MixedJacobians<T, E::Increments, E::Square>);
+call!(MixedConstraintJacobianCall: MixedConstraint,
+    constraint_jacobian_at(1 numbers Unknowns<E, T>) -> MixedConstraintJacobian<T, E::Rows, E::Jacobian>);
+call!(MixedConstraintHessianCall: MixedConstraint,
+    constraint_hessian_at(1 numbers Unknowns<E, T>) -> MixedConstraintHessian<T, E::Rows, E::Jacobian, E::Triangles>);
+call!(MixedGaussNewtonCall: MixedConstraint,
+    gauss_newton_at(1 numbers Unknowns<E, T>) -> MixedHessian<T, Increments<E, T>, E::Upper>);
+call!(NextCall: Stateful, next_at(1 numbers E::Unknowns) -> NextState<T, E::State>);
+call!(NextJacobiansCall: Stateful,
+    next_jacobians_at(1 numbers E::Unknowns) -> NextJacobians<T, E::State, E::ByUnknowns, E::ByState>);
+call!(StateJacobianCall: Stateful,
+    state_jacobian_at(1 numbers E::Unknowns) -> StateJacobian<T, E::Increments, E::StateColumns>);
 
 /// Calls the routine of one vertex.
 #[doc(hidden)]

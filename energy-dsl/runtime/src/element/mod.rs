@@ -9,6 +9,7 @@
 //! - A *square* holds all N×N blocks, row by row.
 
 mod call;
+mod mixed;
 
 use std::borrow::Cow;
 
@@ -24,6 +25,7 @@ use crate::results::{
 use call::WrittenTo;
 #[doc(hidden)]
 pub use call::*;
+pub use mixed::{MixedConstraint, MixedForce, MixedPotential, Stateful};
 
 /// A point or vector in space.
 pub type Vector3<T> = [T; 3];
@@ -60,14 +62,14 @@ impl std::error::Error for RestError {}
 /// typed traits are faster.
 #[derive(Clone, Copy, Debug)]
 pub struct Inputs<'a, T> {
-    /// Parameters, flattened, in the order of the declaration. For a constraint, its stiffness k_s and damping k_d come
-    /// last.
+    /// Parameters, flattened, in the order of the declaration. For a constraint, its stiffness k_s and damping k_d
+    /// follow. The state of an element comes last.
     pub parameters: &'a [T],
     /// Rest-shape inputs.
     pub rest: &'a [T],
-    /// Positions, three numbers per point, or the unknowns of a residual.
+    /// The unknowns: three numbers per point, four per rotation.
     pub positions: &'a [T],
-    /// Velocities, three numbers per point; empty means zero.
+    /// Velocities, one number per increment of the unknowns; empty means zero.
     pub velocities: &'a [T],
 }
 

@@ -1,0 +1,105 @@
+//! Checks `next { … }`: the state of an element after an accepted step. All right sides read the old state.
+
+use super::expression::Checker;
+use super::result::rows;
+use super::signature::{InputName, Signature};
+use super::typed::{Typed, TypedKind};
+use crate::diagnostic::{Diagnostic, Diagnostics, nearest};
+use crate::functions::Shape;
+use crate::syntax::{Body, Declaration, Let, Next};
+
+impl<'a> Checker<'a> {
+    /// Returns the new values of the state, row by row; `None` after an error.
+    pub(super) fn next_state(&mut self, next: &'a Next) -> Option<Typed> {
+        for statement in &next.lets {
+            let value = self.expression(&statement.value);
+            self.define(&statement.name, value, false);
+        }
+        let states: Vec<&InputName> = self.signature.names.iter().filter(|name| name.is_state).collect();
+        let mut values: Vec<Option<Typed>> = vec![None; states.len()];
+        let mut is_sound = true;
+        for assignment in &next.assignments {
+            match self.assigned(assignment, &states) {
+                Some((state, value)) if values[state].is_none() => values[state] = Some(value),
+                Some(_) => {
+                    let name = &assignment.name;
+                    self.error(&name.span, format!("`next` gives the state `{}` two new values", name.text));
+                    is_sound = false;
+                }
+                None => is_sound = false,
+            }
+        }
+        if !is_sound {
+            return None;
+        }
+        let missing: Vec<&str> = states
+            .iter()
+            .zip(&values)
+            .filter(|(_, value)| value.is_none())
+            .map(|(state, _)| state.name.text.as_str())
+            .collect();
+        if let Some(first) = missing.first() {
+            let message = format!("`next` gives no new value to the state: {}", missing.join(", "));
+            let help = format!("a state that stays as it is has {first} = {first};");
+            self.diagnostics.push(Diagnostic::new(&next.span, message).help(help));
+            return None;
+        }
+        let entries = values.into_iter().flatten().flat_map(|value| match value.kind {
+            TypedKind::Array(entries) => entries,
+            _ => vec![value],
+        });
+        Some(rows(entries.collect(), &next.span))
+    }
+
+    /// Returns the number of the state that is assigned to, and its new value.
+    fn assigned(&mut self, Let { name, value, .. }: &'a Let, states: &[&InputName]) -> Option<(usize, Typed)> {
+        let checked = self.expression(value);
+        let Some(number) = states.iter().position(|state| state.canonical == name.canonical()) else {
+            let near = nearest(&name.text, states.iter().map(|state| state.name.text.as_str()));
+            let help = match near {
+                Some(near) => format!("did you mean `{near}`?"),
+                None => "declare it after a `;`, as in (x, y: Point; state a: Scalar), or write `let`".into(),
+            };
+            let message = format!("`{}` is not a state", name.text);
+            self.diagnostics.push(Diagnostic::new(&name.span, message).help(help));
+            return None;
+        };
+        let checked = checked?;
+        let state = states[number];
+        let wanted =
+            state.length.map_or(state.shape, |length| Shape::Array(u16::try_from(length).expect("arrays are short")));
+        let entries = match &checked.kind {
+            TypedKind::Array(entries) if matches!(wanted, Shape::Array(_)) => entries.as_slice(),
+            _ => std::slice::from_ref(&checked),
+        };
+        let wrong = entries.iter().find(|entry| entry.shape != state.shape);
+        if checked.shape != wanted || wrong.is_some() {
+            let found = if checked.shape == wanted { wrong.map_or(checked.shape, |w| w.shape) } else { checked.shape };
+            let message = format!("the state `{}` is {wanted}, but its new value is {found}", name.text);
+            self.error(&value.span, message);
+            return None;
+        }
+        Some((number, checked))
+    }
+}
+
+/// Reports a state without `next`, and `next` without a state.
+pub(super) fn check_presence(
+    declaration: &Declaration,
+    signature: &Signature,
+    body: &Body,
+    diagnostics: &mut Diagnostics,
+) {
+    let state = signature.names.iter().find(|name| name.is_state);
+    let diagnostic = match (state, &body.next) {
+        (Some(state), None) => Diagnostic::new(
+            &state.name.span,
+            format!("`{}` is a state, but nothing says how it goes on", state.name.text),
+        )
+        .help(format!("add next {{ {} = …; }} before the result", state.name.text)),
+        (None, Some(next)) => Diagnostic::new(&next.span, format!("{} has no state", declaration.name.text))
+            .help("declare it after a `;`, as in (x, y: Point; state a: Scalar), or remove `next`"),
+        _ => return,
+    };
+    diagnostics.push(diagnostic);
+}
