@@ -162,6 +162,8 @@ impl Formula {
 pub struct TextbookFormula {
     /// The formula, as a graph. The derivatives that it uses are [`Input::Precomputed`].
     pub formula: Formula,
+    /// The state after a step, in the same graph; empty without a state.
+    pub next: Vec<NodeId>,
     /// Derivatives that the formula uses: node, section and index of the input number. Later ones may use earlier ones.
     pub gradients: Vec<(NodeId, Source, usize)>,
 }
@@ -171,8 +173,10 @@ pub struct TextbookFormula {
 pub fn lower_textbook(program: &Program) -> TextbookFormula {
     let mut lowering = Lowering::new(program, Form::Textbook, None);
     let outputs = lowering.expression(&program.result).parts;
+    let next = program.next.as_ref().map_or_else(Vec::new, |next| lowering.expression(next).parts);
     TextbookFormula {
         formula: Formula { graph: lowering.graph, outputs, repetition: None },
+        next,
         gradients: lowering.gradients,
     }
 }
