@@ -31,7 +31,9 @@ fn functions() -> String {
         table += &format!("| `{}` | {} | {} |\n", cell(function.usage), cell(function.docs), cell(function.accuracy));
     }
     table += "| `sum(j in a..b, term)` | Sum of the terms for j = a, …, b − 1, unrolled. |  |\n";
-    table += "| `gradient(U, p)` | Derivative of a scalar with respect to a point or a parameter. |  |\n";
+    table += "| `len(a)` | Number of entries of an array, a constant. | 0 |\n";
+    table += "| `a % b` | Remainder of two constant whole numbers, for indices. | 0 |\n";
+    table += "| `gradient(U, p)` | Derivative of a scalar with respect to an unknown or a parameter. |  |\n";
     table
 }
 

@@ -1,6 +1,6 @@
 use energy_dsl::{Declaration, Element};
 
-/// Calls a macro with the names of all elements of this crate, in alphabetical order. With `with kinds`, the name of
+/// Calls a macro with the names of all elements of points, and of all residuals, in alphabetical order. With `with kinds`, the name of
 /// what their lanes evaluate comes first: `potential` (energies, and constraints as energies), `force` or `residual`.
 ///
 /// ```
@@ -77,6 +77,7 @@ macro_rules! for_each_element {
             potential PowerLaw,
             potential Pressure,
             potential QuadraticHinge,
+            potential RodBend,
             residual SkeletonPlane,
             residual SkeletonPoint,
             potential SlidingFriction,
@@ -103,11 +104,36 @@ macro_rules! for_each_element {
     };
 }
 
+/// Calls a macro with the names of all elements whose unknowns are not only points of their own, or which have a state, in
+/// alphabetical order.
+///
+/// ```
+/// macro_rules! count {
+///     ($($name:ident),* $(,)?) => { [$(stringify!($name)),*].len() };
+/// }
+/// assert_eq!(energy_elements::for_each_mixed_element!(count), energy_elements::MIXED.len());
+/// ```
+#[macro_export]
+macro_rules! for_each_mixed_element {
+    ($callback:ident) => {
+        $callback! {
+            BallJoint,
+            BodyAnchor,
+            EnclosedVolume,
+            GasReservoir,
+            HingeAxis,
+            MidEdgeShell,
+            RodBendAnisotropic,
+            RodTwist,
+        }
+    };
+}
+
 macro_rules! declarations {
     ($($name:ident),* $(,)?) => { &[$(<crate::$name<f64> as Element>::DECLARATION),*] };
 }
 
-/// The declarations of all elements of this crate, in alphabetical order. A crate that only reads them compiles no
+/// The declarations of all elements of points, and of all residuals, of this crate, in alphabetical order. A crate that only reads them compiles no
 /// routine of the elements.
 ///
 /// ```
@@ -115,3 +141,7 @@ macro_rules! declarations {
 /// assert!(spring.translation_invariant);
 /// ```
 pub const DECLARATIONS: &[&Declaration] = for_each_element!(declarations);
+
+/// The declarations of all elements whose unknowns are not only points of their own, or which have a state, in alphabetical
+/// order.
+pub const MIXED: &[&Declaration] = for_each_mixed_element!(declarations);

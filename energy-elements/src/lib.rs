@@ -18,7 +18,7 @@
 
 mod declarations;
 
-pub use declarations::DECLARATIONS;
+pub use declarations::{DECLARATIONS, MIXED};
 
 macro_rules! elements {
     ($($file:ident: $($name:ident),+;)*) => {
@@ -39,6 +39,7 @@ elements! {
     distance: Distance;
     distance_squared: DistanceSquared;
     edge_edge_distance: EdgeEdgeDistance;
+    enclosed_gas: EnclosedVolume, GasReservoir;
     flat_bending: FlatBending;
     gravity: Gravity;
     hair_bend: HairBend;
@@ -51,6 +52,7 @@ elements! {
     hooke_spring: HookeSpring, StructuralSpring, ShearSpring, BendingSpring;
     ipc_barrier: DistanceBarrier;
     ipc_barrier_squared: SquaredDistanceBarrier;
+    mid_edge_shell: MidEdgeShell;
     neo_hookean_log: NeoHookean, StableNeoHookeanLog;
     orthotropic_stvk: OrthotropicStVK;
     parallel_edges: ParallelEdges;
@@ -61,6 +63,8 @@ elements! {
     power_law: PowerLaw;
     pressure: Pressure;
     quadratic_hinge: QuadraticHinge;
+    rigid_joints: BallJoint, BodyAnchor, HingeAxis;
+    rod: RodBend, RodBendAnisotropic, RodTwist;
     sliding_friction: SlidingFriction;
     sphere_contact: SphereContact;
     spring: Spring;

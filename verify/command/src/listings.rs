@@ -29,7 +29,8 @@ pub fn listings(name: &str) -> anyhow::Result<Vec<Listing>> {
 /// # Errors
 /// If the element does not exist.
 pub fn catalogue_source(name: &str) -> anyhow::Result<String> {
-    let names = || crate::catalogue::elements().iter().map(|e| &*e.declaration.name).collect::<Vec<_>>().join(", ");
+    let all = || crate::catalogue::elements().iter().chain(crate::catalogue::mixed());
+    let names = || all().map(|e| &*e.declaration.name).collect::<Vec<_>>().join(", ");
     let entry =
         crate::catalogue::find(name).with_context(|| format!("there is no element `{name}`; there are {}", names()))?;
     Ok(entry.declaration.source.clone().into_owned())

@@ -100,7 +100,7 @@ impl Options {
 ///
 /// # Errors
 /// If the catalogue does not have one of the names.
-pub fn targets_in(catalogue: &'static [AnyElement], names: &[&str]) -> Result<Vec<Target>, String> {
+pub fn targets_in(catalogue: &[AnyElement], names: &[&str]) -> Result<Vec<Target>, String> {
     let has = |name: &str| catalogue.iter().any(|entry| entry.declaration.name == name);
     if let Some(unknown) = names.iter().find(|name| !has(name)) {
         let known = catalogue.iter().map(|entry| &*entry.declaration.name).collect::<Vec<_>>().join(", ");

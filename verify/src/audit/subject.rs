@@ -22,7 +22,7 @@ pub struct Target(Origin);
 
 #[derive(Clone, Debug)]
 enum Origin {
-    Catalogue(&'static AnyElement),
+    Catalogue(AnyElement),
     /// With the claims of its text, which its source is without.
     Text(Box<Interpreted>),
 }
@@ -33,8 +33,8 @@ const LARGEST_TEXT: u64 = 16 << 20;
 impl Target {
     /// Creates the target of an element of the catalogue.
     #[must_use]
-    pub fn of_element(entry: &'static AnyElement) -> Self {
-        Self(Origin::Catalogue(entry))
+    pub fn of_element(entry: &AnyElement) -> Self {
+        Self(Origin::Catalogue(*entry))
     }
 
     /// Returns every declaration of a text in the format of an `.energy` file; messages call it `name`.

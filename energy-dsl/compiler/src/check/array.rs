@@ -106,6 +106,60 @@ impl<'a> Checker<'a> {
         }
     }
 
+    /// Checks `interpolate(K, t)` and `interpolate(K, x, t)` of arrays K and x.
+    #[inline(never)]
+    pub(super) fn interpolate(&mut self, name: &Name, arguments: &'a [Expression]) -> Option<Typed> {
+        let (table, knots, place) = match arguments {
+            [table, place] => (table, None, place),
+            [table, knots, place] => (table, Some(knots), place),
+            _ => {
+                return self
+                    .error(&name.span, "write interpolate(K, t), or interpolate(K, x, t) with an array x of knots");
+            }
+        };
+        let values = self.numbers_of(table);
+        let knots = knots.map(|knots| self.numbers_of(knots).map(|numbers| (knots, numbers)));
+        let at = self.expression(place);
+        let (mut values, at) = (values?, at?);
+        let knots = match knots {
+            None => (0..values.len()).map(|number| constant(number as f64, &name.span)).collect(),
+            Some(given) => {
+                let (expression, numbers) = given?;
+                if numbers.len() != values.len() {
+                    let message = format!("{} knots for {} numbers", numbers.len(), values.len());
+                    return self.error(&expression.span, message);
+                }
+                let known: Vec<Option<f64>> =
+                    numbers.iter().map(|number| super::constant::evaluate(&self.bindings, number)).collect();
+                let falls = |pair: &[Option<f64>]| matches!(pair, [Some(a), Some(b)] if a >= b);
+                if known.windows(2).any(falls) {
+                    return self.error(&expression.span, "the knots must increase");
+                }
+                numbers
+            }
+        };
+        if values.len() < 2 {
+            return self.error(&table.span, "a table has two numbers or more");
+        }
+        values.extend(knots);
+        values.push(at);
+        self.apply("interpolate", &name.span, values)
+    }
+
+    /// Returns the entries of an array of numbers.
+    fn numbers_of(&mut self, array: &'a Expression) -> Option<Vec<Typed>> {
+        let Typed { kind, shape, .. } = self.expression(array)?;
+        match kind {
+            TypedKind::Array(entries) if entries.iter().all(|entry| entry.shape == Shape::Scalar) => Some(entries),
+            _ => {
+                let help = "write the table as [a, b, c], or declare it: K: [Scalar[N]; 8]";
+                let message = format!("a table is an array of numbers, but this is {shape}");
+                self.diagnostics.push(Diagnostic::new(&array.span, message).help(help));
+                None
+            }
+        }
+    }
+
     /// Checks `a % b` of constants, as in an index that runs around a ring.
     #[inline(never)]
     pub(super) fn remainder(&mut self, name: &Name, arguments: &'a [Expression]) -> Option<Typed> {

@@ -1,6 +1,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::constant::Globals;
+use super::names::CONTEXTUAL;
 use super::remedy;
 use super::signature::Signature;
 use super::typed::{Binding, Source, Typed, TypedKind};
@@ -345,6 +346,9 @@ impl<'a> Checker<'a> {
             "gradient" => return self.gradient(name, arguments),
             "identity" => return self.identity(name, arguments),
             "%" => return self.remainder(name, arguments),
+            "interpolate" if !self.functions.iter().any(|function| function.name.text == "interpolate") => {
+                return self.interpolate(name, arguments);
+            }
             "len" if !self.functions.iter().any(|function| function.name.text == "len") => {
                 return self.length(name, arguments);
             }
@@ -371,7 +375,7 @@ impl<'a> Checker<'a> {
     fn called(&mut self, name: &Name, checked: Vec<Typed>) -> Option<Typed> {
         // A function of the text with a name of the language is an error already.
         let user = self.functions.iter().rev().find(|f| f.name.text == name.text).copied();
-        let user = user.filter(|_| functions::find(&name.text).is_none());
+        let user = user.filter(|_| functions::find(&name.text).is_none() || CONTEXTUAL.contains(&name.text.as_str()));
         if let Some(function) = user {
             return self.inline(name, function, checked);
         }

@@ -6,6 +6,8 @@ use crate::diagnostic::{Diagnostic, Diagnostics};
 use crate::functions;
 use crate::syntax::{Body, Declaration, Expression, ExpressionKind, Item, Name, UserFunction, without_hat};
 
+/// Functions of the language that a text may define otherwise.
+pub(super) const CONTEXTUAL: [&str; 1] = ["interpolate"];
 /// Names that the language treats as functions although they are not in its table.
 const FORMS: [&str; 3] = ["gradient", "identity", "sum"];
 /// Names of numbers, with their numbers.
@@ -195,6 +197,7 @@ impl<'a> Names<'a, '_> {
     fn report_hidden(&mut self, name: &Name, role: Role) {
         let text = &name.text;
         let function = functions::find(text).is_some() || FORMS.contains(&text.as_str());
+        let function = function && !CONTEXTUAL.contains(&text.as_str());
         let number = NUMBERS.iter().find(|(number, _)| number == text).map(|(_, meaning)| *meaning);
         let built_in = if function { Some("a function of the language") } else { number };
         if let Some(built_in) = built_in.filter(|_| role != Role::Variable) {

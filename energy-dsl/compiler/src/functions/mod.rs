@@ -27,6 +27,7 @@ mod shape;
 mod sinc;
 mod singular;
 mod spatial_polar;
+mod spline;
 mod trigonometric;
 mod turned;
 mod units;
@@ -73,6 +74,7 @@ pub fn all() -> impl Iterator<Item = &'static Function> {
         error_function::FUNCTIONS,
         sinc::FUNCTIONS,
         loss::FUNCTIONS,
+        spline::FUNCTIONS,
         linear_algebra::FUNCTIONS,
         polar::FUNCTIONS,
         singular::FUNCTIONS,

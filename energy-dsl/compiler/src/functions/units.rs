@@ -43,4 +43,6 @@ pub enum Units {
     Transformed,
     /// Takes a value whose first part has no unit, and returns a number without a unit.
     Orientation,
+    /// Takes values of one unit, as many places and one more place of another; returns a value of the first unit.
+    Interpolated,
 }

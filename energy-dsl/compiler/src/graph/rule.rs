@@ -93,6 +93,8 @@ pub enum Primitive {
     SingularValue(u8),
     /// A function of the singular values of F.
     Spectral,
+    /// A cubic spline through the numbers of a table.
+    Spline,
     /// A component of the quaternion exp(δ) q at δ = 0.
     Turned(u8),
     /// A component of a vector that such a quaternion turns.
@@ -169,6 +171,7 @@ impl Primitive {
             Self::StretchTraceExcess => "tr S − 3 of a polar decomposition F = R S",
             Self::DistanceToRotation => "squared distance ‖F − R‖² to the rotation of F = R S",
             Self::SingularValue(_) | Self::Spectral => "functions of singular values",
+            Self::Spline => "cubic spline",
             Self::InnerProduct
             | Self::Partial { .. }
             | Self::SincSqrtSlope

@@ -11,8 +11,8 @@ use energy_runtime::{BatchError, Declaration, Flagged, Float, RoutineKind};
 /// Elements of one declaration, bound to their parameters and rest shapes.
 ///
 /// Methods take a range of elements that starts at a multiple of [`TAPE_BLOCK`](energy_runtime::tape::TAPE_BLOCK), and
-/// slices of that range alone: positions, p points of three coordinates per element, and places for the results. They
-/// return the indices and flags of flagged elements. Several threads may call them for different ranges.
+/// slices of that range alone: positions, p points of three coordinates per element, or the unknowns of a residual and of
+/// mixed declarations; and places for the results, 3 p numbers or one per increment. They return the indices and flags of flagged elements. Several threads may call them for different ranges.
 #[derive(Clone, Debug)]
 pub struct Elements<S = f64> {
     element: Interpreted,
@@ -212,6 +212,56 @@ impl<S: Float> Elements<S> {
         let Layouts { rows, jacobian, .. } = self.layouts();
         let outputs = &mut [output("residuals", rows, residuals), output("Jacobians", jacobian, jacobians)];
         self.evaluate(RoutineKind::Jacobian, range, u, None, outputs)
+    }
+
+    /// Writes the state of each element after a step that ends at its unknowns `u`.
+    ///
+    /// # Errors
+    /// When the declaration has no state, or the slices do not fit the range.
+    pub fn next_states(&self, range: Range<usize>, u: &[S], states: &mut [S]) -> Result<Flagged, EvaluateError> {
+        let Layouts { state, .. } = self.layouts();
+        self.evaluate(RoutineKind::Next, range, u, None, &mut [output("states", state, states)])
+    }
+
+    /// Writes the state of each element after a step, and its derivatives by the increments of the unknowns and by the
+    /// state before, row by row.
+    ///
+    /// # Errors
+    /// When the declaration has no state, or the slices do not fit the range.
+    pub fn next_jacobians(
+        &self,
+        range: Range<usize>,
+        u: &[S],
+        states: &mut [S],
+        by_unknowns: &mut [S],
+        by_state: &mut [S],
+    ) -> Result<Flagged, EvaluateError> {
+        let Layouts { state, next_jacobians: [unknowns, before], .. } = self.layouts();
+        let by_unknowns = output("Jacobians by unknowns", unknowns, by_unknowns);
+        let by_state = output("Jacobians by state", before, by_state);
+        self.evaluate(
+            RoutineKind::NextJacobians,
+            range,
+            u,
+            None,
+            &mut [output("states", state, states), by_unknowns, by_state],
+        )
+    }
+
+    /// Writes ∂U/∂u and ∂²U/∂u∂(state) of each element, row by row; r and ∂r/∂(state) of a residual.
+    ///
+    /// # Errors
+    /// When the declaration has no state or is a force, or the slices do not fit the range.
+    pub fn state_jacobians(
+        &self,
+        range: Range<usize>,
+        u: &[S],
+        slopes: &mut [S],
+        by_state: &mut [S],
+    ) -> Result<Flagged, EvaluateError> {
+        let Layouts { slopes: [first, mixed], .. } = self.layouts();
+        let outputs = &mut [output("slopes", first, slopes), output("Jacobians by state", mixed, by_state)];
+        self.evaluate(RoutineKind::StateJacobian, range, u, None, outputs)
     }
 
     fn layouts(&self) -> &Layouts {

@@ -3,7 +3,7 @@
 use energy_runtime::{Declaration, Kind, triangle_index};
 
 /// Indices among the results of a routine, in the order of the full matrices that callers want.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Layouts {
     /// The first result: U.
     pub value: Vec<u16>,
@@ -21,13 +21,34 @@ pub struct Layouts {
     pub rows: Vec<u16>,
     /// ∂C/∂x or ∂r/∂u, row by row.
     pub jacobian: Vec<u16>,
+    /// The state after a step.
+    pub state: Vec<u16>,
+    /// Its derivatives by the unknowns and by the state before, row by row.
+    pub next_jacobians: [Vec<u16>; 2],
+    /// ∂U/∂u or r, and its derivative by the state, row by row.
+    pub slopes: [Vec<u16>; 2],
 }
 
 impl Layouts {
     pub(super) fn of(declaration: &Declaration) -> Self {
-        if declaration.is_mixed() {
-            return Self::of_mixed(declaration);
+        let own = if declaration.is_mixed() { Self::of_mixed(declaration) } else { Self::of_points(declaration) };
+        let increments = declaration.increments();
+        let states: usize = declaration.state.iter().map(|field| field.size).sum();
+        let slopes = if declaration.kind == Kind::Residual { declaration.rows } else { increments };
+        let (by_unknowns, by_state) = (states * increments, states * states);
+        Self {
+            state: indices(0..states),
+            next_jacobians: [
+                indices(states..states + by_unknowns),
+                indices(states + by_unknowns..states + by_unknowns + by_state),
+            ],
+            slopes: [indices(0..slopes), indices(slopes..slopes + slopes * states)],
+            ..own
         }
+    }
+
+    /// Returns the places of points in 3-vectors and 3×3 blocks.
+    fn of_points(declaration: &Declaration) -> Self {
         let points = if declaration.kind == Kind::Residual { 0 } else { declaration.points.len() };
         let (n, rows) = (3 * points, declaration.rows);
         let entries = || (0..n).flat_map(move |row| (0..n).map(move |column| (row, column)));
@@ -48,6 +69,7 @@ impl Layouts {
             force_jacobians: [square(n), square(n + n * n)],
             rows: indices(0..rows),
             jacobian: indices(rows..rows + rows * declaration.increments()),
+            ..Self::default()
         }
     }
 
@@ -65,6 +87,7 @@ impl Layouts {
             force_jacobians: [n, n + n * n].map(|first| indices(first..first + n * n)),
             rows: indices(0..rows),
             jacobian: indices(rows..rows + rows * n),
+            ..Self::default()
         }
     }
 }

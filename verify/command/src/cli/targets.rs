@@ -11,7 +11,7 @@ pub fn targets(names: &[String], file: Option<&Path>) -> anyhow::Result<Vec<Targ
             anyhow::bail!("{path} is a file, not the name of an element; give it as `--file {path}`");
         }
         let names: Vec<&str> = names.iter().map(String::as_str).collect();
-        return targets_in(verify_command::catalogue::elements(), &names).map_err(anyhow::Error::msg);
+        return targets_in(&verify_command::catalogue::all(), &names).map_err(anyhow::Error::msg);
     };
     let notice = Notice::of(format!("compiling {} …", file.display()));
     let all = Target::of_file(file)?;

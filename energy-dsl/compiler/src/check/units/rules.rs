@@ -75,6 +75,11 @@ pub(super) fn apply(inference: &mut Inference<'_>, call: &Call<'_>, rule: Rule) 
             let dual = Units::one(call.units[0].other());
             inference.same(call.name, &[&dual, &call.units[1]], call.span)
         }
+        Rule::Interpolated => {
+            let (values, places) = all.split_at(all.len() / 2);
+            inference.same(call.name, places, call.span);
+            inference.same(call.name, values, call.span)
+        }
         Rule::Orientation => {
             inference.number(call.name, &call.main(0), call.span);
             number()
