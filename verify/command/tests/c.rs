@@ -295,6 +295,71 @@ fn c_in_single_precision_has_the_bits_of_rust() {
     check::<f32>(&Compiler { command: &["gcc", "-std=c99"] }, "c-f32");
 }
 
+/// Projected Hessians are the nearest positive semi-definite matrices: Q max(Λ, 0) Qᵀ of nalgebra's decomposition.
+/// Both methods are backward stable, so they differ by some n u ‖H‖; 100 u ‖H‖ (Frobenius) is allowed, with u = 2⁻⁵³.
+#[test]
+fn projected_hessians_are_the_nearest_semi_definite_ones() {
+    const NAMES: [&str; 2] = ["QuadraticHinge", "StVK"];
+    if !exists("gcc") {
+        println!("skipped: there is no gcc");
+        return;
+    }
+    let of_name = |name: &str| {
+        let entry = catalogue::elements().iter().find(|entry| entry.declaration.name == name);
+        interpreted(entry.expect("the catalogue has it").declaration)
+    };
+    let elements = NAMES.map(of_name);
+    let folder = folder("projected");
+    let mut text = String::new();
+    for file in sources(&elements, Target::C, &[Precision::Double]).unwrap() {
+        std::fs::write(folder.join(&file.name), &file.text).unwrap();
+        if file.name.ends_with(".h") && !file.is_shared {
+            text.push_str(&format!("#include \"{}\"\n", file.name));
+        }
+    }
+    std::fs::write(folder.join("elements.h"), text).unwrap();
+    let program = folder.join("program");
+    let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/projected.c");
+    let mut gcc = Command::new("gcc");
+    gcc.arg("-std=c99").args(OPTIONS).arg("-I").arg(&folder).arg(source).arg("-o").arg(&program).arg("-lm");
+    let output = gcc.output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let mut random = fastrand::Rng::with_seed(23);
+    let mut bytes = Vec::new();
+    let numbers: Vec<usize> = (0..400).map(|i| i % 2).collect();
+    for &number in &numbers {
+        let mut uniform = |count: usize| (0..count).map(|_| 2.0 * random.f64() - 1.0).collect::<Vec<f64>>();
+        // Rest triangles around (0, 0), (1, 0), (0, 1); points anywhere, so that triangles are often compressed.
+        let corners = [0.0, 0.0, 1.0, 0.0, 0.0, 1.0];
+        let rest: Vec<f64> = uniform(6).iter().zip(corners).map(|(x, corner)| corner + 0.2 * x).collect();
+        let parameters: Vec<f64> = uniform(2).iter().map(|x| 1.5 + x).collect();
+        let positions = uniform(if number == 0 { 12 } else { 9 });
+        bytes.extend(u32::try_from(number).unwrap().to_le_bytes());
+        let inputs = rest[..if number == 0 { 0 } else { 6 }].iter().chain(&parameters).chain(&positions);
+        bytes.extend(inputs.flat_map(|x| x.to_le_bytes()));
+    }
+    let records = folder.join("records");
+    std::fs::write(&records, bytes).unwrap();
+    let output = Command::new(program).arg(&records).output().unwrap();
+    assert!(output.status.success(), "{}", output.status);
+    let mut found = output.stdout.chunks_exact(8).map(|bytes| f64::from_le_bytes(bytes.try_into().unwrap()));
+    let (mut indefinite, mut largest) = ([0; 2], 0.0_f64);
+    for &number in &numbers {
+        let n = if number == 0 { 12 } else { 9 };
+        let mut matrix = || nalgebra::DMatrix::from_iterator(n, n, found.by_ref().take(n * n));
+        let (hessian, projected) = (matrix(), matrix());
+        assert_eq!(projected, projected.transpose());
+        let decomposition = hessian.clone().symmetric_eigen();
+        indefinite[number] += usize::from(decomposition.eigenvalues.min() < -1e-3 * hessian.norm());
+        let clamped = nalgebra::DMatrix::from_diagonal(&decomposition.eigenvalues.map(|value| value.max(0.0)));
+        let nearest = &decomposition.eigenvectors * clamped * decomposition.eigenvectors.transpose();
+        largest = largest.max((projected - nearest).norm() / (hessian.norm() * f64::EPSILON / 2.0));
+    }
+    println!("{indefinite:?} of {NAMES:?} are indefinite; the largest difference is {largest:.0} u ‖H‖");
+    assert!(found.next().is_none() && indefinite.iter().all(|&count| count > 100), "{indefinite:?}");
+    assert!(largest < 100.0, "{largest} u");
+}
+
 /// Loops over elements, one at a time and in vectors, have the bits of single calls. Every fifth element suffices: the
 /// loops are the same for all.
 #[test]
