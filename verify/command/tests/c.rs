@@ -12,7 +12,25 @@ use verify_command::stress::sweeps;
 
 /// A compiler of C or C++, with the options that all code must compile with.
 struct Compiler {
-    command: &'static [&'static str],
+    command: Vec<String>,
+}
+
+impl Compiler {
+    /// Splits a command at its spaces.
+    fn new(command: &str) -> Self {
+        Self { command: command.split_whitespace().map(str::to_owned).collect() }
+    }
+
+    /// Returns the clang that the variable CLANG names, such as `python3 -m ziglang cc`, or that is in `PATH`.
+    fn clang() -> Self {
+        let command = std::env::var("CLANG").unwrap_or_else(|_| "clang".to_owned());
+        Self::new(&format!("{command} -std=c99 -march=native"))
+    }
+
+    fn exists(&self) -> bool {
+        let version = Command::new(&self.command[0]).args(&self.command[1..]).arg("--version").output();
+        version.is_ok_and(|output| output.status.success())
+    }
 }
 
 const OPTIONS: [&str; 7] = ["-Wall", "-Wextra", "-pedantic", "-Wconversion", "-Werror", "-ffp-contract=off", "-O1"];
@@ -159,7 +177,7 @@ fn compiled(compiler: &Compiler, elements: &[Interpreted], precision: Precision,
     std::fs::write(folder.join("elements.h"), all).unwrap();
     let driver = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/driver.c");
     let program = folder.join("program");
-    let output = Command::new(compiler.command[0])
+    let output = Command::new(&compiler.command[0])
         .args(&compiler.command[1..])
         .args(OPTIONS)
         .arg("-I")
@@ -258,7 +276,7 @@ fn cases<S: Bits>(elements: &[Interpreted]) -> Vec<Case<S>> {
 }
 
 fn check<S: Bits>(compiler: &Compiler, name: &str) {
-    if !exists(compiler.command[0]) {
+    if !compiler.exists() {
         println!("skipped: there is no {}", compiler.command[0]);
         return;
     }
@@ -287,12 +305,17 @@ fn check<S: Bits>(compiler: &Compiler, name: &str) {
 
 #[test]
 fn c_has_the_bits_of_rust() {
-    check::<f64>(&Compiler { command: &["gcc", "-std=c99"] }, "c-f64");
+    check::<f64>(&Compiler::new("gcc -std=c99"), "c-f64");
 }
 
 #[test]
 fn c_in_single_precision_has_the_bits_of_rust() {
-    check::<f32>(&Compiler { command: &["gcc", "-std=c99"] }, "c-f32");
+    check::<f32>(&Compiler::new("gcc -std=c99"), "c-f32");
+}
+
+#[test]
+fn c_by_clang_has_the_bits_of_rust() {
+    check::<f64>(&Compiler::clang(), "c-clang-f64");
 }
 
 /// Projected Hessians are the nearest positive semi-definite matrices: Q max(Λ, 0) Qᵀ of nalgebra's decomposition.
