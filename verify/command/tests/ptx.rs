@@ -50,7 +50,8 @@ fn ptx_has_the_operations_of_the_plan() {
     for (name, (element, routine)) in sources.zip(KERNELS) {
         // Fused operations are allowed: intrinsics are not to be contracted.
         let (source, ptx) = (folder.join(format!("{name}.cu")), folder.join(format!("{name}.ptx")));
-        let output = Command::new(&nvcc).args(["-ptx", "-arch=sm_80"]).arg(source).arg("-o").arg(&ptx).output().unwrap();
+        let output =
+            Command::new(&nvcc).args(["-ptx", "-arch=sm_80"]).arg(source).arg("-o").arg(&ptx).output().unwrap();
         assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
         let ptx = std::fs::read_to_string(ptx).unwrap();
         assert!(!ptx.contains(".f64"), "{element}: double precision");
