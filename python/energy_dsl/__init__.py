@@ -77,14 +77,14 @@ def load(path: str | _os.PathLike[str], *, limits: _Limits | None = None) -> lis
 
 
 @_functools.cache
-def element(name: str) -> Element:
+def element(name: str, vertices: bool = False) -> Element:
     """Returns an element of the library, such as "HingeAngle". `catalogue()` lists their names.
 
     Up to 475 operations (100 in float32), its values, gradients, Hessians, forces, residuals and Jacobians are compiled
     code, with the bits of the same text in `energy`. Larger elements and products with Hessians run as tapes.
-    `bind(...).is_compiled` tells.
+    `bind(...).is_compiled` tells. With `vertices`, it has `vertex`, which runs as a tape.
     """
-    found = _library_element(name)
+    found = _library_element(name, vertices)
     if found is None:
         raise KeyError(f"no element {name!r} in the library; catalogue() lists its names")
     return found

@@ -89,6 +89,18 @@ class Elements:
         self, x: ArrayLike, *, out: _Three | None = None, flags: bool
     ) -> _Three | tuple[_Array, _Array, _Array, _Flags]: ...
     @overload
+    def vertex(
+        self, x: ArrayLike, point: int, *, out: _Three | None = None, flags: Literal[False] = False
+    ) -> _Three: ...
+    @overload
+    def vertex(
+        self, x: ArrayLike, point: int, *, out: _Three | None = None, flags: Literal[True]
+    ) -> tuple[_Array, _Array, _Array, _Flags]: ...
+    @overload
+    def vertex(
+        self, x: ArrayLike, point: int, *, out: _Three | None = None, flags: bool
+    ) -> _Three | tuple[_Array, _Array, _Array, _Flags]: ...
+    @overload
     def hessian_vector(
         self, x: ArrayLike, v: ArrayLike, *, out: _Array | None = None, flags: Literal[False] = False
     ) -> _Array: ...
@@ -212,6 +224,18 @@ class Element:
     @overload
     def hessian(
         self, x: ArrayLike, *, out: _Three | None = None, flags: bool, **inputs: ArrayLike
+    ) -> _Three | tuple[_Array, _Array, _Array, _Flags]: ...
+    @overload
+    def vertex(
+        self, x: ArrayLike, point: int, *, out: _Three | None = None, flags: Literal[False] = False, **inputs: ArrayLike
+    ) -> _Three: ...
+    @overload
+    def vertex(
+        self, x: ArrayLike, point: int, *, out: _Three | None = None, flags: Literal[True], **inputs: ArrayLike
+    ) -> tuple[_Array, _Array, _Array, _Flags]: ...
+    @overload
+    def vertex(
+        self, x: ArrayLike, point: int, *, out: _Three | None = None, flags: bool, **inputs: ArrayLike
     ) -> _Three | tuple[_Array, _Array, _Array, _Flags]: ...
     @overload
     def hessian_vector(
@@ -410,7 +434,7 @@ class Simulation:
 
 def energies(text: str, file: str = "<text>", *, limits: _Limits | None = None) -> list[Element]: ...
 def catalogue() -> list[str]: ...
-def library_element(name: str) -> Element | None: ...
+def library_element(name: str, vertices: bool) -> Element | None: ...
 def run(
     text: str, path: str, output: str, *, overwrite: bool = False, checkpoint: int | None = None,
     ignore_memory: bool = False, threads: int | None = None, progress: _Progress | None = None,

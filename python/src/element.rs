@@ -2,11 +2,11 @@
 
 use std::sync::{Arc, Mutex, PoisonError};
 
-use energy_compiler::{Elements as Tapes, InputKind, InputNumbers, Interpreted, Limits};
+use energy_compiler::{Budget, Elements as Tapes, InputKind, InputNumbers, Interpreted, Limits};
 use energy_dsl::RoutineKind;
 use energy_dsl::tape::Column;
 use numpy::{PyArrayDescr, PyArrayDescrMethods, PyArrayDyn, PyUntypedArray, PyUntypedArrayMethods};
-use pyo3::exceptions::{PyTypeError, PyValueError};
+use pyo3::exceptions::{PyIndexError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyFloat, PyInt, PyString, PyTuple};
 
@@ -118,15 +118,17 @@ pub fn catalogue() -> Vec<&'static str> {
 }
 
 /// Returns an element of the library; `None` if it has no such element. Its energies, forces and residuals run as
-/// compiled code.
+/// compiled code; with `vertices`, it has routines of single vertices, which run as tapes.
 #[pyfunction]
-pub fn library_element(py: Python<'_>, name: &str) -> PyResult<Option<Element>> {
+pub fn library_element(py: Python<'_>, name: &str, vertices: bool) -> PyResult<Option<Element>> {
     let Some(declaration) = energy_elements::DECLARATIONS.iter().find(|declaration| declaration.name == name) else {
         return Ok(None);
     };
-    let mut elements = py
-        .detach(|| Interpreted::from_source(&declaration.source).map_err(|errors| errors.to_string()))
-        .map_err(wrong)?;
+    let compile = || match vertices {
+        true => Interpreted::from_file_with_vertices(&declaration.source, name, &Budget::default()),
+        false => Interpreted::from_source(&declaration.source),
+    };
+    let mut elements = py.detach(|| compile().map_err(|errors| errors.to_string())).map_err(wrong)?;
     Ok(elements.pop().map(|inner| Element::new(inner, Origin::Library)))
 }
 
@@ -231,6 +233,9 @@ impl Element {
     fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyTuple>)> {
         let package = py.import("energy_dsl")?;
         Ok(match &self.origin {
+            Origin::Library if self.has_vertices() => {
+                (package.getattr("element")?, (self.name(), true).into_pyobject(py)?)
+            }
             Origin::Library => (package.getattr("element")?, (self.name(),).into_pyobject(py)?),
             Origin::Text(text, number) => {
                 let Text { text, file, limits } = &**text;
@@ -399,6 +404,63 @@ evaluations! {
     residual(u) => Residual;
     /// Returns r and ∂r/∂u, of shape (n, rows, unknowns).
     jacobian(u) => Jacobian;
+}
+
+#[pymethods]
+impl Element {
+    /// Returns U, of shape (n,), and its derivatives by one point of each element: of shape (n, 3) and (n, 3, 3).
+    #[pyo3(signature = (x, point, *, out = None, flags = false, **inputs))]
+    fn vertex<'py>(
+        &self,
+        x: &Bound<'py, PyAny>,
+        point: usize,
+        out: Option<&Bound<'py, PyAny>>,
+        flags: bool,
+        inputs: Option<&Bound<'py, PyDict>>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let routine = self.vertex_routine(point)?;
+        self.bound_for(x, inputs)?.evaluate(&Request { routine, x, v: None, out, flags })
+    }
+}
+
+#[pymethods]
+impl Elements {
+    /// Returns U, of shape (n,), and its derivatives by one point of each element: of shape (n, 3) and (n, 3, 3).
+    #[pyo3(signature = (x, point, *, out = None, flags = false))]
+    fn vertex<'py>(
+        &self,
+        x: &Bound<'py, PyAny>,
+        point: usize,
+        out: Option<&Bound<'py, PyAny>>,
+        flags: bool,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let routine = self.declared().vertex_routine(point)?;
+        self.evaluate(&Request { routine, x, v: None, out, flags })
+    }
+}
+
+impl Element {
+    /// Returns the routine of a point.
+    fn vertex_routine(&self, point: usize) -> PyResult<RoutineKind> {
+        let (name, points) = (self.name(), self.point_count());
+        let routine = u8::try_from(point).ok().filter(|_| point < points).map(RoutineKind::Vertex);
+        let message = || format!("point: expected less than {points}, the number of points of {name}, got {point}");
+        let routine = routine.ok_or_else(|| PyIndexError::new_err(message()))?;
+        if self.has_vertices() {
+            return Ok(routine);
+        }
+        let remedy = match self.origin {
+            _ if !matches!(self.kind(), "energy" | "constraint") => "only energies and constraints have them".to_owned(),
+            Origin::Library => format!("get it by element(\"{name}\", vertices=True)"),
+            Origin::Text(..) => format!("declare it as `#[vertex] {} {name}`", self.kind()),
+        };
+        Err(PyValueError::new_err(format!("{name} has no routines of single vertices: {remedy}")))
+    }
+
+    /// Returns whether it has routines of single vertices.
+    fn has_vertices(&self) -> bool {
+        self.inner.routines().has(RoutineKind::Vertex(0))
+    }
 }
 
 /// Returns whether inputs of this kind are bound before elements are evaluated.

@@ -49,8 +49,7 @@ impl Elements {
     /// Returns the declaration that was bound.
     #[getter]
     fn element(&self) -> Element {
-        let inner = any!(self, batch => batch.tapes.element()).clone();
-        Element::new(inner, self.origin.clone())
+        self.declared()
     }
 
     /// Name of the dtype that elements are evaluated in.
@@ -76,7 +75,7 @@ impl Elements {
     fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyTuple>)> {
         let bound = py.import("energy_dsl")?.getattr("_bound")?;
         let inputs = self.inputs.as_ref().map_or_else(|| PyDict::new(py), |inputs| inputs.bind(py).clone());
-        let arguments = (self.element(), self.__len__(), self.dtype(), self.threads(), inputs);
+        let arguments = (self.declared(), self.__len__(), self.dtype(), self.threads(), inputs);
         Ok((bound, arguments.into_pyobject(py)?))
     }
 
@@ -95,6 +94,12 @@ impl Elements {
 }
 
 impl Elements {
+    /// Returns the declaration that was bound.
+    pub fn declared(&self) -> Element {
+        let inner = any!(self, batch => batch.tapes.element()).clone();
+        Element::new(inner, self.origin.clone())
+    }
+
     pub fn double(batch: Batch<f64>, origin: Origin) -> Self {
         Self { batch: AnyBatch::Double(batch), origin, inputs: None }
     }
@@ -254,6 +259,7 @@ impl<S: Precision> Batch<S> {
             (RoutineKind::Value, [u]) => tapes.values(all, x, u),
             (RoutineKind::Gradient, [u, g]) => tapes.gradients(all, x, u, g),
             (RoutineKind::Hessian, [u, g, h]) => tapes.hessians(all, x, u, g, h),
+            (RoutineKind::Vertex(point), [u, g, block]) => tapes.vertices(point, all, x, u, g, block),
             (RoutineKind::HessianVector, [product]) => tapes.hessian_vectors(all, x, v, product),
             (RoutineKind::Force, [f]) => tapes.forces(all, x, v, f),
             (RoutineKind::Jacobians, [f, by_x, by_v]) => tapes.force_jacobians(all, x, v, f, by_x, by_v),
@@ -308,8 +314,8 @@ impl Sizes {
             RoutineKind::Rest
             | RoutineKind::ReducedHessian
             | RoutineKind::ConstraintHessian
-            | RoutineKind::GaussNewton
-            | RoutineKind::Vertex(_) => ([unused; 3], 0),
+            | RoutineKind::GaussNewton => ([unused; 3], 0),
+            RoutineKind::Vertex(_) => ([energy, slot("gradient", [n, 3].into()), slot("block", [n, 3, 3].into())], 3),
             RoutineKind::Jacobian => ([residual, slot("Jacobian", [n, rows, self.unknowns].into()), unused], 2),
         }
     }

@@ -1,5 +1,7 @@
 """Elements: values, derivatives, shapes and messages."""
 
+import pickle
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -36,6 +38,32 @@ def test_derivatives_agree_with_differences():
             (ahead[1] - behind[1]).reshape(5, 12) / (2 * step), H[:, i], rtol=1e-5, atol=1e-6 * np.abs(H).max()
         )
     assert np.array_equal(H, H.transpose(0, 2, 1))
+
+
+def test_vertices_have_their_part_of_the_hessian():
+    hinge = ed.element("HingeAngle", vertices=True)
+    x = positions(70, 4)
+    U, g, H = hinge.hessian(x)
+    for point in range(4):
+        value, gradient, block = hinge.vertex(x, point)
+        assert value.shape == (70,) and gradient.shape == (70, 3) and block.shape == (70, 3, 3)
+        np.testing.assert_allclose(value, U, rtol=1e-13)
+        np.testing.assert_allclose(gradient, g[:, point], rtol=1e-10, atol=1e-12 * np.abs(g).max())
+        own = H[:, 3 * point:3 * point + 3, 3 * point:3 * point + 3]
+        np.testing.assert_allclose(block, own, rtol=1e-9, atol=1e-12 * np.abs(H).max())
+    assert pickle.loads(pickle.dumps(hinge)).vertex(x, 1)[0][0] == hinge.bind(70, threads=2).vertex(x, 1)[0][0]
+    spring = ed.energy("#[vertex] " + SPRING)
+    x = np.array([[[0.0, 0, 0], [2, 0, 0]], [[1.0, 0, 0], [1, 0, 0]]])
+    out = (np.empty(2), np.empty((2, 3)), np.empty((2, 3, 3)))
+    *_, flags = spring.vertex(x, 1, k=3.0, L=1.0, out=out, flags=True)
+    assert out[0][0] == 1.5 and out[1][0].tolist() == [3, 0, 0] and np.diag(out[2][0]).tolist() == [3, 1.5, 1.5]
+    assert flags.tolist() == [0, 1]
+    with pytest.raises(IndexError, match="point: expected less than 2, the number of points of Spring, got 2"):
+        spring.vertex(x, 2, k=3.0, L=1.0)
+    with pytest.raises(ValueError, match=r"declare it as `#\[vertex\] energy Spring`"):
+        ed.energy(SPRING).vertex(x, 1, k=3.0, L=1.0)
+    with pytest.raises(ValueError, match="vertices=True"):
+        ed.element("HookeSpring").vertex(x, 1, K=3.0, L=1.0)
 
 
 def test_one_value_for_all_equals_one_for_each(spring):

@@ -8,6 +8,7 @@ mod elements;
 mod errata;
 mod fusion_reference;
 mod multiprecision;
+mod ptx;
 mod tape;
 mod tracked_skirt;
 mod warp;

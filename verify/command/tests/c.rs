@@ -12,7 +12,25 @@ use verify_command::stress::sweeps;
 
 /// A compiler of C or C++, with the options that all code must compile with.
 struct Compiler {
-    command: &'static [&'static str],
+    command: Vec<String>,
+}
+
+impl Compiler {
+    /// Splits a command at its spaces.
+    fn new(command: &str) -> Self {
+        Self { command: command.split_whitespace().map(str::to_owned).collect() }
+    }
+
+    /// Returns the clang that the variable CLANG names, such as `python3 -m ziglang cc`, or that is in `PATH`.
+    fn clang() -> Self {
+        let command = std::env::var("CLANG").unwrap_or_else(|_| "clang".to_owned());
+        Self::new(&format!("{command} -std=c99 -march=native"))
+    }
+
+    fn exists(&self) -> bool {
+        let version = Command::new(&self.command[0]).args(&self.command[1..]).arg("--version").output();
+        version.is_ok_and(|output| output.status.success())
+    }
 }
 
 const OPTIONS: [&str; 7] = ["-Wall", "-Wextra", "-pedantic", "-Wconversion", "-Werror", "-ffp-contract=off", "-O1"];
@@ -159,7 +177,7 @@ fn compiled(compiler: &Compiler, elements: &[Interpreted], precision: Precision,
     std::fs::write(folder.join("elements.h"), all).unwrap();
     let driver = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/driver.c");
     let program = folder.join("program");
-    let output = Command::new(compiler.command[0])
+    let output = Command::new(&compiler.command[0])
         .args(&compiler.command[1..])
         .args(OPTIONS)
         .arg("-I")
@@ -258,7 +276,7 @@ fn cases<S: Bits>(elements: &[Interpreted]) -> Vec<Case<S>> {
 }
 
 fn check<S: Bits>(compiler: &Compiler, name: &str) {
-    if !exists(compiler.command[0]) {
+    if !compiler.exists() {
         println!("skipped: there is no {}", compiler.command[0]);
         return;
     }
@@ -287,12 +305,82 @@ fn check<S: Bits>(compiler: &Compiler, name: &str) {
 
 #[test]
 fn c_has_the_bits_of_rust() {
-    check::<f64>(&Compiler { command: &["gcc", "-std=c99"] }, "c-f64");
+    check::<f64>(&Compiler::new("gcc -std=c99"), "c-f64");
 }
 
 #[test]
 fn c_in_single_precision_has_the_bits_of_rust() {
-    check::<f32>(&Compiler { command: &["gcc", "-std=c99"] }, "c-f32");
+    check::<f32>(&Compiler::new("gcc -std=c99"), "c-f32");
+}
+
+#[test]
+fn c_by_clang_has_the_bits_of_rust() {
+    check::<f64>(&Compiler::clang(), "c-clang-f64");
+}
+
+/// Projected Hessians are the nearest positive semi-definite matrices: Q max(Λ, 0) Qᵀ of nalgebra's decomposition.
+/// Both methods are backward stable, so they differ by some n u ‖H‖; 100 u ‖H‖ (Frobenius) is allowed, with u = 2⁻⁵³.
+#[test]
+fn projected_hessians_are_the_nearest_semi_definite_ones() {
+    const NAMES: [&str; 2] = ["QuadraticHinge", "StVK"];
+    if !exists("gcc") {
+        println!("skipped: there is no gcc");
+        return;
+    }
+    let of_name = |name: &str| {
+        let entry = catalogue::elements().iter().find(|entry| entry.declaration.name == name);
+        interpreted(entry.expect("the catalogue has it").declaration)
+    };
+    let elements = NAMES.map(of_name);
+    let folder = folder("projected");
+    let mut text = String::new();
+    for file in sources(&elements, Target::C, &[Precision::Double]).unwrap() {
+        std::fs::write(folder.join(&file.name), &file.text).unwrap();
+        if file.name.ends_with(".h") && !file.is_shared {
+            text.push_str(&format!("#include \"{}\"\n", file.name));
+        }
+    }
+    std::fs::write(folder.join("elements.h"), text).unwrap();
+    let program = folder.join("program");
+    let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/projected.c");
+    let mut gcc = Command::new("gcc");
+    gcc.arg("-std=c99").args(OPTIONS).arg("-I").arg(&folder).arg(source).arg("-o").arg(&program).arg("-lm");
+    let output = gcc.output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let mut random = fastrand::Rng::with_seed(23);
+    let mut bytes = Vec::new();
+    let numbers: Vec<usize> = (0..400).map(|i| i % 2).collect();
+    for &number in &numbers {
+        let mut uniform = |count: usize| (0..count).map(|_| 2.0 * random.f64() - 1.0).collect::<Vec<f64>>();
+        // Rest triangles around (0, 0), (1, 0), (0, 1); points anywhere, so that triangles are often compressed.
+        let corners = [0.0, 0.0, 1.0, 0.0, 0.0, 1.0];
+        let rest: Vec<f64> = uniform(6).iter().zip(corners).map(|(x, corner)| corner + 0.2 * x).collect();
+        let parameters: Vec<f64> = uniform(2).iter().map(|x| 1.5 + x).collect();
+        let positions = uniform(if number == 0 { 12 } else { 9 });
+        bytes.extend(u32::try_from(number).unwrap().to_le_bytes());
+        let inputs = rest[..if number == 0 { 0 } else { 6 }].iter().chain(&parameters).chain(&positions);
+        bytes.extend(inputs.flat_map(|x| x.to_le_bytes()));
+    }
+    let records = folder.join("records");
+    std::fs::write(&records, bytes).unwrap();
+    let output = Command::new(program).arg(&records).output().unwrap();
+    assert!(output.status.success(), "{}", output.status);
+    let mut found = output.stdout.chunks_exact(8).map(|bytes| f64::from_le_bytes(bytes.try_into().unwrap()));
+    let (mut indefinite, mut largest) = ([0; 2], 0.0_f64);
+    for &number in &numbers {
+        let n = if number == 0 { 12 } else { 9 };
+        let mut matrix = || nalgebra::DMatrix::from_iterator(n, n, found.by_ref().take(n * n));
+        let (hessian, projected) = (matrix(), matrix());
+        assert_eq!(projected, projected.transpose());
+        let decomposition = hessian.clone().symmetric_eigen();
+        indefinite[number] += usize::from(decomposition.eigenvalues.min() < -1e-3 * hessian.norm());
+        let clamped = nalgebra::DMatrix::from_diagonal(&decomposition.eigenvalues.map(|value| value.max(0.0)));
+        let nearest = &decomposition.eigenvectors * clamped * decomposition.eigenvectors.transpose();
+        largest = largest.max((projected - nearest).norm() / (hessian.norm() * f64::EPSILON / 2.0));
+    }
+    println!("{indefinite:?} of {NAMES:?} are indefinite; the largest difference is {largest:.0} u ‖H‖");
+    assert!(found.next().is_none() && indefinite.iter().all(|&count| count > 50), "{indefinite:?}");
+    assert!(largest < 100.0, "{largest} u");
 }
 
 /// Loops over elements, one at a time and in vectors, have the bits of single calls. Every fifth element suffices: the

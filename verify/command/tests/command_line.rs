@@ -314,6 +314,24 @@ fn generated_code_is_shown() {
 }
 
 #[test]
+fn code_in_other_languages_is_shown() {
+    let show = |language: &[&str]| {
+        let output = verify(&[&["show", "HookeSpring", "--lang"], language].concat());
+        assert!(output.status.success(), "{}", text(&output.stderr));
+        text(&output.stdout)
+    };
+    let c = show(&["c"]);
+    assert!(c.contains("unsigned hooke_spring_f64_gradient(") && c.contains("const energy_f64_element"), "{c}");
+    assert!(!c.contains("double energy_f64_sum_error(") && !c.contains("cmake"), "what all elements share: {c}");
+    assert!(show(&["cpp"]).contains("hooke_spring_f64.cpp: generated"));
+    let cuda = show(&["cuda", "--precision", "f32"]);
+    assert!(cuda.contains("__global__ void hooke_spring_f32_vertex_kernel(") && !cuda.contains("double"), "{cuda}");
+    assert!(show(&["warp"]).contains("def hooke_spring_f64_gradient("));
+    let refused = verify(&["show", "HookeSpring", "--lang", "c", "--plan"]);
+    assert!(text(&refused.stderr).contains("cannot be used with"), "{}", text(&refused.stderr));
+}
+
+#[test]
 fn plans_name_each_route_and_the_one_taken() {
     let printed = text(&verify(&["show", "StVK", "--plan"]).stdout);
     for route in ["forward over forward", "adjoint-weighted", "gathered at primitives", "reverse"] {

@@ -54,6 +54,52 @@ static COLUMN column(const REAL *list, int32_t size) {
     return of;
 }
 
+/* Compares the loops of single vertices, a different one for each element, with single elements. Returns whether they
+   are the same. */
+static int vertices_are_same(int32_t e, BATCH batch, REAL *x, REAL *parameters, REAL *stored) {
+    const ELEMENT *element = elements[e];
+    const size_t points = (size_t)element->coordinates / 3U, sizes[3] = {1U, 3U, 9U};
+    uint32_t *chosen = (uint32_t *)calloc(batch.count + 1U, sizeof *chosen);
+    unsigned char *flags = (unsigned char *)calloc(batch.count + 1U, 1U);
+    REAL *found[3], of_one[13];
+    size_t i;
+    int k, way, are_same = 1;
+    batch.points = chosen;
+    batch.flags = flags;
+    for (k = 0; k < 3; k++) {
+        found[k] = numbers(batch.count * sizes[k]);
+        batch.results[k].numbers = found[k];
+        batch.results[k].per_element = sizes[k];
+        batch.results[k].per_number = 1U;
+    }
+    for (way = 0; way < 2; way++) {
+        for (i = 0; i < batch.count; i++) {
+            chosen[i] = (uint32_t)((i + (size_t)way) % points);
+        }
+        (way == 0 ? plain : in_lanes)[e](ENERGY_VERTEX, &batch);
+        for (i = 0; i < batch.count && are_same; i++) {
+            const unsigned expected =
+                element->vertex((int32_t)chosen[i], x + i * (size_t)element->coordinates,
+                                parameters + i * (size_t)element->parameters, stored + i * (size_t)element->stored,
+                                of_one, of_one + 1, of_one + 4);
+            are_same = expected == flags[i] && same(of_one, found[0] + i, 1U) &&
+                       same(of_one + 1, found[1] + 3U * i, 3U) && same(of_one + 4, found[2] + 9U * i, 9U);
+        }
+    }
+    /* A vertex that does not exist. */
+    if (batch.count > 0U) {
+        chosen[0] = (uint32_t)points;
+        plain[e](ENERGY_VERTEX, &batch);
+        are_same = are_same && flags[0] == ENERGY_DEGENERATE && found[0][0] == 0 && found[2][8] == 0;
+    }
+    for (k = 0; k < 3; k++) {
+        free(found[k]);
+    }
+    free(chosen);
+    free(flags);
+    return are_same;
+}
+
 int main(int argc, char **argv) {
     const size_t most = 4096;
     FILE *file = fopen(argv[argc - 1], "rb");
@@ -142,6 +188,18 @@ int main(int argc, char **argv) {
             for (k = 0; k < 3; k++) {
                 free(of_each[k]);
                 free(flags[k]);
+            }
+        }
+        if (element->vertex != NULL) {
+            BATCH batch;
+            memset(&batch, 0, sizeof batch);
+            batch.count = good;
+            batch.x = column(sound[2], sizes[2]);
+            batch.parameters = column(sound[1], sizes[1]);
+            batch.stored = column(stored, element->stored);
+            if (!vertices_are_same(e, batch, sound[2], sound[1], stored)) {
+                printf("%s: other vertices\n", element->name);
+                return 1;
             }
         }
         for (k = 0; k < 4; k++) {

@@ -38,7 +38,7 @@ pub(super) fn stamped(name: &str, about: &[String], body: &str) -> SourceFile {
         let _ = writeln!(text, "{next}{line}");
     }
     let _ = write!(text, "{next}SPDX-License-Identifier: MIT OR Apache-2.0\n{next}hash: {:016x}{close}\n", hash(body));
-    SourceFile { name: name.to_owned(), text: text + body }
+    SourceFile { name: name.to_owned(), text: text + body, is_shared: false }
 }
 
 /// Returns whether a text is a file that was generated.

@@ -64,13 +64,18 @@ impl Element<'_> {
         };
         let (mut text, mut cases) = (String::new(), String::new());
         for Function { kind, name: routine, arguments, results } in self.functions() {
-            if matches!(kind, RoutineKind::Vertex(_)) {
+            // One kernel has all vertices.
+            let is_vertex = matches!(kind, RoutineKind::Vertex(_));
+            let routine = if is_vertex { "vertex".to_owned() } else { routine };
+            if is_vertex && kind != RoutineKind::Vertex(0) {
                 continue;
             }
             let _ = writeln!(text, "__global__ void {name}_{routine}_kernel({batch} batch) {{");
             let _ = writeln!(text, "    const size_t i = (size_t)blockIdx.x * blockDim.x + threadIdx.x;");
             for array in arguments.iter().chain(&results) {
-                let _ = writeln!(text, "    {real} {}[{}];", array.name, array.size.max(1));
+                // A vertex that does not exist has no results.
+                let zero = if is_vertex { " = {0}" } else { "" };
+                let _ = writeln!(text, "    {real} {}[{}]{zero};", array.name, array.size.max(1));
             }
             text.push_str("    unsigned flags;\n    if (i >= batch.count) {\n        return;\n    }\n");
             for Argument { name, size, .. } in &arguments {
@@ -84,14 +89,18 @@ impl Element<'_> {
                 let _ = writeln!(text, "    {}", function(how, &format!("{from}, i, {size}, {name}")));
             }
             let list: Vec<&str> = arguments.iter().chain(&results).map(|array| array.name).collect();
-            let _ = writeln!(text, "    flags = {name}_{routine}({});", list.join(", "));
+            let (before, point) = match is_vertex {
+                true => ("batch.points == NULL ? ENERGY_DEGENERATE : ", "(int32_t)batch.points[i], "),
+                false => ("", ""),
+            };
+            let _ = writeln!(text, "    flags = {before}{name}_{routine}({point}{});", list.join(", "));
             for (place, Argument { name, size, .. }) in results.iter().enumerate() {
                 let slots = format!(
                     "energy_{}_slot_size(ENERGY_{}, {place}, {size})",
                     self.dialect.precision.name(),
                     routine.to_uppercase()
                 );
-                let coordinates = self.plan.coordinates;
+                let coordinates = if is_vertex { 3 } else { self.plan.coordinates };
                 let write = format!("&batch.results[{place}], i, {size}, {slots}, {coordinates}, {name}");
                 let _ = writeln!(text, "    {}", function("write", &write));
             }

@@ -4,12 +4,10 @@ typedef uint32_t @lanes_run(int32_t routine, const @lanes *const *arguments, @la
 
 /* Reads the inputs of as many elements as there are lanes. */
 ENERGY_FN void @lanes_read(const @column *from, size_t first, int32_t count, @lanes *numbers) {
-    int32_t j, lane;
+    int32_t j;
     for (j = 0; j < count; j++) {
         const @real *place = from->numbers + first * from->per_element + (size_t)j * from->per_number;
-        for (lane = 0; lane < @LANES; lane++) {
-            numbers[j][lane] = place[(size_t)lane * from->per_element];
-        }
+        numbers[j] = from->per_element == 1U ? @lanes_load(place) : @lanes_strided(place, from->per_element);
     }
 }
 
@@ -21,13 +19,37 @@ ENERGY_FN void @lanes_read_points(const @batch *batch, const @column *from, size
         const int32_t points = count / 3;
         int32_t point, lane;
         for (point = 0; point < points; point++) {
+            size_t places[@LANES];
             for (lane = 0; lane < @LANES; lane++) {
-                const size_t element = first + (size_t)lane;
-                const @real *vertex = from->numbers + 3U * (size_t)batch->stencils[element * (size_t)points + (size_t)point];
-                numbers[3 * point][lane] = vertex[0];
-                numbers[3 * point + 1][lane] = vertex[1];
-                numbers[3 * point + 2][lane] = vertex[2];
+                places[lane] = 3U * (size_t)batch->stencils[(first + (size_t)lane) * (size_t)points + (size_t)point];
             }
+            numbers[3 * point] = @lanes_gathered(from->numbers, places);
+            numbers[3 * point + 1] = @lanes_gathered(from->numbers + 1, places);
+            numbers[3 * point + 2] = @lanes_gathered(from->numbers + 2, places);
+        }
+    }
+}
+
+/* Stores vectors as rows of `count` numbers each, which are `stride` apart. */
+ENERGY_FN void @lanes_store_all(const @lanes *numbers, int32_t count, @real *rows, size_t stride) {
+    int32_t j;
+    if (count >= @LANES) {
+        for (j = 0; j + @LANES <= count; j += @LANES) {
+            @lanes_store_rows(numbers + j, rows + j, stride);
+        }
+        /* The last square covers numbers again. */
+        if (j < count) {
+            @lanes_store_rows(numbers + (count - @LANES), rows + (count - @LANES), stride);
+        }
+    } else {
+        @lanes square[@LANES];
+        @real all[@LANES * @LANES];
+        for (j = 0; j < @LANES; j++) {
+            square[j] = numbers[j < count ? j : count - 1];
+        }
+        @lanes_store_rows(square, all, @LANES);
+        for (j = 0; j < @LANES; j++) {
+            memcpy(rows + (size_t)j * stride, all + j * @LANES, (size_t)count * sizeof *rows);
         }
     }
 }
@@ -39,6 +61,16 @@ ENERGY_FN int @lanes_write(const @result *to, size_t first, int32_t count, const
     int32_t j, lane;
     if (to->layout != ENERGY_AS_RETURNED) {
         return 0;
+    }
+    if (to->per_number == 1U && count > 1) {
+        @lanes_store_all(numbers, count, place, to->per_element);
+        return 1;
+    }
+    if (to->per_element == 1U) {
+        for (j = 0; j < count; j++) {
+            @lanes_store(numbers[j], place + (size_t)j * to->per_number);
+        }
+        return 1;
     }
     for (lane = 0; lane < @LANES; lane++) {
         @real *row = place + (size_t)lane * to->per_element;
@@ -54,14 +86,16 @@ ENERGY_FN int @lanes_write(const @result *to, size_t first, int32_t count, const
    `single` for those of one element. Results are written or added in the order of the elements. */
 ENERGY_FN void @run_lanes(const @element *element, @lanes_run *run, int32_t routine, @batch *batch, @lanes *work,
                           @real *single) {
-    const int32_t *sizes = element->sizes[routine];
+    /* Rest shapes and single vertices are computed one at a time: each vector would need one vertex for all its elements. */
+    const int is_single = routine == ENERGY_REST || routine == ENERGY_VERTEX;
+    const int32_t *sizes = element->sizes[is_single ? ENERGY_REST : routine];
     const int has_velocities =
         routine == ENERGY_HESSIAN_VECTOR || routine == ENERGY_FORCE || routine == ENERGY_JACOBIANS;
     @lanes *x = work, *v = x + element->coordinates, *parameters = v + element->coordinates;
     @lanes *stored = parameters + element->parameters;
     @lanes *results[3];
     const @lanes *arguments[4];
-    const size_t whole = routine == ENERGY_REST ? 0U : batch->count - batch->count % @LANES;
+    const size_t whole = is_single ? 0U : batch->count - batch->count % @LANES;
     size_t first;
     int32_t place, j, lane;
     int is_written[3];
@@ -86,6 +120,12 @@ ENERGY_FN void @run_lanes(const @element *element, @lanes_run *run, int32_t rout
         for (place = 0; place < 3; place++) {
             is_written[place] = batch->results[place].numbers == NULL ||
                                 @lanes_write(&batch->results[place], first, sizes[place], results[place]);
+        }
+        if (rare == 0U && is_written[0] && is_written[1] && is_written[2]) {
+            if (batch->flags != NULL) {
+                memset(batch->flags + first, 0, @LANES);
+            }
+            continue;
         }
         for (lane = 0; lane < @LANES; lane++) {
             if ((rare >> lane & 1U) != 0U) {

@@ -14,6 +14,24 @@ typedef @real @lanes __attribute__((vector_size(@LANES * sizeof(@real))));
 typedef @ints @lane_mask __attribute__((vector_size(@LANES * sizeof(@real))));
 typedef @bits @lane_bits __attribute__((vector_size(@LANES * sizeof(@real))));
 
+/* Results of a shuffle: numbers of a, and after them those of b. */
+#if !defined(ENERGY_SHUFFLE) && (defined(__clang__) || __GNUC__ >= 12)
+#define ENERGY_SHUFFLE(masks, a, b, ...) return __builtin_shufflevector(a, b, __VA_ARGS__)
+#elif !defined(ENERGY_SHUFFLE)
+#define ENERGY_SHUFFLE(masks, a, b, ...) \
+    const masks order = {__VA_ARGS__};   \
+    return __builtin_shuffle(a, b, order)
+#endif
+
+ENERGY_FN @lanes @lanes_load(const @real *numbers) {
+    @lanes all;
+    memcpy(&all, numbers, sizeof all);
+    return all;
+}
+
+ENERGY_FN void @lanes_store(@lanes all, @real *numbers) { memcpy(numbers, &all, sizeof all); }
+
+@TRANSPOSITION
 ENERGY_FN @lanes @lanes_splat(@real a) {
     @lanes all;
     int i;
@@ -43,11 +61,15 @@ ENERGY_FN uint32_t @lanes_marked(@lane_mask mask) {
 }
 
 ENERGY_FN @lanes @lanes_sqrt(@lanes a) {
-    @lanes root;
+    @lanes root = a;
+#if defined(ENERGY_SQRT_LANES)
+    ENERGY_SQRT_LANES(root, a, "@S");
+#else
     int i;
     for (i = 0; i < @LANES; i++) {
         root[i] = @M_sqrt(a[i]);
     }
+#endif
     return root;
 }
 

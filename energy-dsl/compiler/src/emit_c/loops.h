@@ -50,6 +50,8 @@ typedef struct {
     size_t flagged, unsettled_count;
     /* On a GPU, both are added to these two numbers instead. */
     uint32_t *counts;
+    /* For ENERGY_VERTEX: the point of each element by which derivatives are taken, counted from 0 in the element. */
+    const uint32_t *points;
 } @batch;
 
 /* Reads the inputs of an element. */
@@ -163,9 +165,25 @@ ENERGY_FN int32_t @moving(const @element *element) {
     return element->coordinates > element->rest ? element->coordinates : element->rest;
 }
 
+/* Writes 1, 3 and 9 numbers: U, and its derivatives by one point of an element. They are 0 if there is no such point. */
+ENERGY_FN unsigned @run_vertex(const @element *element, const @batch *batch, size_t i, const @real *const *arguments,
+                               @real *const *results) {
+    memset(results[0], 0, sizeof(@real));
+    memset(results[1], 0, 3 * sizeof(@real));
+    memset(results[2], 0, 9 * sizeof(@real));
+    if (batch->points == NULL || batch->points[i] >= (uint32_t)element->coordinates / 3U) {
+        return ENERGY_DEGENERATE;
+    }
+    return element->vertex((int32_t)batch->points[i], arguments[0], arguments[1], arguments[2], results[0], results[1],
+                           results[2]);
+}
+
 /* Runs a routine of an element on many elements, in order. For ENERGY_REST, `batch->x` is the rest shape. `work` has room for all inputs and results of one. */
 ENERGY_FN void @run_each(const @element *element, int32_t routine, @batch *batch, size_t first, size_t count, @real *work) {
-    const int32_t *sizes = element->sizes[routine];
+    const int32_t of_vertex[3] = {1, 3, 9}, none[3] = {0, 0, 0};
+    const int is_vertex = routine == ENERGY_VERTEX && element->vertex != NULL;
+    const int32_t *sizes = is_vertex ? of_vertex : routine == ENERGY_VERTEX ? none : element->sizes[routine];
+    const int32_t coordinates = is_vertex ? 3 : element->coordinates;
     const int has_velocities =
         routine == ENERGY_HESSIAN_VECTOR || routine == ENERGY_FORCE || routine == ENERGY_JACOBIANS;
     @real *x = work, *v = x + @moving(element), *parameters = v + element->coordinates;
@@ -193,10 +211,11 @@ ENERGY_FN void @run_each(const @element *element, int32_t routine, @batch *batch
         }
         @read(&batch->parameters, i, element->parameters, parameters);
         @read(&batch->stored, i, element->stored, stored);
-        flags = element->run(routine, arguments, results);
+        flags = is_vertex ? @run_vertex(element, batch, i, arguments, results)
+                          : element->run(routine, arguments, results);
         for (place = 0; place < 3; place++) {
             @write(&batch->results[place], i, sizes[place], @slot_size(routine, place, sizes[place]),
-                   element->coordinates, results[place]);
+                   coordinates, results[place]);
         }
         @note(batch, i, flags);
     }

@@ -6,12 +6,15 @@
 
 mod dialect;
 mod element;
+mod expansion;
 mod expression;
 mod folder;
 mod function;
 mod host;
 mod numbers;
+mod routine;
 mod tape;
+mod transposition;
 mod warp;
 
 use std::fmt::Write as _;
@@ -45,6 +48,14 @@ pub struct SourceFile {
     pub name: String,
     /// Text.
     pub text: String,
+    /// Whether it is the same for all elements.
+    pub is_shared: bool,
+}
+
+impl SourceFile {
+    fn shared(self) -> Self {
+        Self { is_shared: true, ..self }
+    }
 }
 
 /// Renders elements as a folder that needs nothing else: headers, loops over elements, a `README.md` and a
@@ -111,7 +122,7 @@ impl std::error::Error for SourceError {}
 fn of_precision(elements: &[Interpreted], names: &[String], target: Target, precision: Precision) -> Vec<SourceFile> {
     let suffix = precision.name();
     let shared = |part: &str, about: &str, text: String| {
-        folder::stamped(&format!("energy_{suffix}{part}.h"), &[about.to_owned()], &text)
+        folder::stamped(&format!("energy_{suffix}{part}.h"), &[about.to_owned()], &text).shared()
     };
     let mut files = vec![
         shared("", "Numbers, rounding errors, elementary functions.", numbers::header(precision)),
@@ -156,7 +167,7 @@ fn project(files: &[SourceFile], target: Target, precisions: &[Precision]) -> [S
         include_str!("CMakeLists.txt.in").replace("@LANGUAGE@", language).replace("@FILES@", &sources.join("\n"));
     let described: Vec<&str> = precisions.iter().map(|precision| precision.described()).collect();
     let readme = include_str!("README.md.in").replace("@PRECISIONS@", &described.join(" and "));
-    [folder::stamped("CMakeLists.txt", &[], &cmake), folder::stamped("README.md", &[], &readme)]
+    [("CMakeLists.txt", cmake), ("README.md", readme)].map(|(name, text)| folder::stamped(name, &[], &text).shared())
 }
 
 /// Returns the header of an element.

@@ -52,6 +52,17 @@
 #define ENERGY_HIDE(a) __asm__("" : "+m"(a))
 #define ENERGY_HIDE_ON_ARM(a) ENERGY_HIDE(a)
 #endif
+/* Square roots by the processor's instruction: compilers would call the function of the library for negative numbers, which
+   sets errno. */
+#if defined(__GNUC__) && !defined(__CUDACC__) && defined(__x86_64__) && defined(__AVX__)
+#define ENERGY_SQRT(root, a, type) __asm__("vsqrts" type " {%1, %1, %0|%0, %1, %1}" : "=v"(root) : "v"(a))
+#define ENERGY_SQRT_LANES(root, a, type) __asm__("vsqrtp" type " {%1, %0|%0, %1}" : "=v"(root) : "v"(a))
+#elif defined(__GNUC__) && !defined(__CUDACC__) && defined(__x86_64__)
+#define ENERGY_SQRT(root, a, type) __asm__("sqrts" type " {%1, %0|%0, %1}" : "=x"(root) : "x"(a))
+#define ENERGY_SQRT_LANES(root, a, type) __asm__("sqrtp" type " {%1, %0|%0, %1}" : "=x"(root) : "x"(a))
+#elif defined(__GNUC__) && !defined(__CUDACC__) && defined(__aarch64__)
+#define ENERGY_SQRT(root, a, type) __asm__("fsqrt %" type "0, %" type "1" : "=w"(root) : "w"(a))
+#endif
 /* Flags that routines return. Results are documented conventions where one is set. */
 /* A true singularity, or an input outside of the formula's domain. */
 #define ENERGY_DEGENERATE 1U
@@ -59,6 +70,8 @@
 #define ENERGY_KINK 2U
 /* Only limits along rays could tell the results; see README.md. ENERGY_DEGENERATE is set, too. */
 #define ENERGY_UNSETTLED 4U
+/* Returned inside of the generated code: only the general path can tell. */
+#define ENERGY_GENERAL 8U
 /* Numbers of routines. */
 enum {
 @@ROUTINES
@@ -102,6 +115,10 @@ ENERGY_FN @real @div(@real a, @real b) {
 ENERGY_FN @real @sqrt(@real a) {
 #if defined(__CUDA_ARCH__)
     return @I_sqrt(a);
+#elif defined(ENERGY_SQRT)
+    @real root;
+    ENERGY_SQRT(root, a, "@S");
+    return root;
 #else
     return @M_sqrt(a);
 #endif

@@ -55,7 +55,8 @@ pub(super) fn loops(precision: Precision) -> String {
 pub(super) fn lanes(precision: Precision) -> String {
     let functions = functions(Dialect { precision, numbers: Numbers::Lanes, operators: true });
     let includes = format!("#include \"energy_{}_loops.h\"\n\n", precision.name());
-    let parts = [include_str!("lanes.h"), &functions, "\n", include_str!("lane_loops.h")];
+    let vectors = include_str!("lanes.h").replace("@TRANSPOSITION\n", &super::transposition::functions(precision));
+    let parts = [&*vectors, &functions, "\n", include_str!("lane_loops.h")];
     guarded(precision, "_lanes", &includes, &parts)
 }
 
@@ -75,7 +76,9 @@ fn guarded(precision: Precision, name: &str, includes: &str, parts: &[&str]) -> 
 /// Returns the numbers of routines, as entries of an enumeration.
 fn routines() -> String {
     let list = RoutineKind::ALL.iter().map(|kind| format!("    ENERGY_{}", kind.name().to_uppercase()));
-    list.chain(["    ENERGY_ROUTINES".to_owned()]).collect::<Vec<_>>().join(",\n")
+    let of_vertex = "    /* Of loops: U, and its derivatives by one point alone, which `batch.points` tells. */\n    \
+                     ENERGY_VERTEX = ENERGY_ROUTINES";
+    list.chain(["    ENERGY_ROUTINES", of_vertex].map(str::to_owned)).collect::<Vec<_>>().join(",\n")
 }
 
 /// Writes an elementary function.
@@ -116,6 +119,7 @@ pub(super) fn filled(precision: Precision, text: &str) -> String {
         ("@I_div", choose("__ddiv_rn", "__fdiv_rn")),
         ("@I_sqrt", choose("__dsqrt_rn", "__fsqrt_rn")),
         ("@I_fma", choose("__fma_rn", "__fmaf_rn")),
+        ("@S", choose("d", "s")),
         ("@M_sqrt", choose("sqrt", "sqrtf")),
         ("@M_fma", choose("fma", "fmaf")),
         ("@M_fabs", choose("fabs", "fabsf")),

@@ -129,6 +129,26 @@ impl<S: Float> Elements<S> {
         self.evaluate(RoutineKind::Hessian, range, x, None, outputs)
     }
 
+    /// Writes U, ∂U/∂xᵢ (3 numbers) and ∂²U/∂xᵢ² (3 × 3 numbers, row by row) of each element, where xᵢ is its point
+    /// `point`.
+    ///
+    /// # Errors
+    /// When the declaration has no routines of single vertices or no such point, or the slices do not fit the range.
+    pub fn vertices(
+        &self,
+        point: u8,
+        range: Range<usize>,
+        x: &[S],
+        energies: &mut [S],
+        gradients: &mut [S],
+        blocks: &mut [S],
+    ) -> Result<Flagged, EvaluateError> {
+        let [value, gradient, block]: [&[u16]; 3] = [&[0], &[1, 2, 3], &[4, 5, 6, 7, 8, 9, 10, 11, 12]];
+        let (energies, gradients) = (output("energies", value, energies), output("gradients", gradient, gradients));
+        let outputs = &mut [energies, gradients, output("blocks", block, blocks)];
+        self.evaluate(RoutineKind::Vertex(point), range, x, None, outputs)
+    }
+
     /// Writes (∂²U/∂x²) v (3 p numbers) of each element.
     ///
     /// # Errors

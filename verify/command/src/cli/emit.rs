@@ -2,33 +2,14 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use anyhow::Context;
-use clap::{Args, ValueEnum};
+use clap::Args;
 use energy_cli::{Notice, print};
-use energy_compiler::{Budget, Interpreted, Origin, Precision, SourceFile, Target, origin, sources};
+use energy_compiler::{Budget, Interpreted, Origin, SourceFile, origin, sources};
+
+use super::language::{Language, Numbers};
 
 /// The largest file that may be overwritten, in bytes.
 const LARGEST: u64 = 256 << 20;
-
-/// A language to write.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum Language {
-    /// C99, which is also C++17.
-    C,
-    /// The same, in files that end in .cpp.
-    Cpp,
-    /// CUDA C++: functions for host and device, and kernels with one element a thread.
-    Cuda,
-    /// A Python module of functions for kernels of Warp, with adjoints.
-    Warp,
-}
-
-/// The numbers to write for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum Numbers {
-    F64,
-    F32,
-    Both,
-}
 
 /// Writes elements as C, C++, CUDA or Warp: a folder that needs nothing else, and compiles to the bits of the Rust library.
 ///
@@ -59,18 +40,7 @@ impl Emit {
         for name in &self.names {
             elements.extend(declarations(name)?);
         }
-        let target = match self.lang {
-            Language::C => Target::C,
-            Language::Cpp => Target::Cpp,
-            Language::Cuda => Target::Cuda,
-            Language::Warp => Target::Warp,
-        };
-        let precisions: &[Precision] = match self.precision {
-            Numbers::F64 => &[Precision::Double],
-            Numbers::F32 => &[Precision::Single],
-            Numbers::Both => &[Precision::Double, Precision::Single],
-        };
-        let files = sources(&elements, target, precisions)?;
+        let files = sources(&elements, self.lang.target(), self.precision.list())?;
         let written = write(&self.output, &files, self.force)?;
         let folder = self.output.display();
         print(&format!(
@@ -83,7 +53,7 @@ impl Emit {
 }
 
 /// Compiles an element of the catalogue or a file.
-fn declarations(name: &str) -> anyhow::Result<Vec<Interpreted>> {
+pub(super) fn declarations(name: &str) -> anyhow::Result<Vec<Interpreted>> {
     let path = Path::new(name);
     let (text, file) = if path.extension().is_some_and(|extension| extension == "energy") {
         let text = energy_files::read_text(path, LARGEST).with_context(|| format!("cannot read {name}"))?;

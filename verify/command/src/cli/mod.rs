@@ -4,6 +4,7 @@ mod audit;
 mod bench;
 mod emit;
 mod eval;
+mod language;
 mod output;
 mod policy;
 mod reference;

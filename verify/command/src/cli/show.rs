@@ -1,6 +1,10 @@
 use anyhow::Context;
 use clap::Args;
 use energy_cli::print;
+use energy_compiler::sources;
+
+use super::emit::declarations;
+use super::language::{Language, Numbers};
 
 /// Prints the code generated for an element.
 #[derive(Args)]
@@ -16,10 +20,24 @@ pub struct Show {
     /// Print the operation counts of each routine instead, and of the Hessian with each point pinned.
     #[arg(long, conflicts_with_all = ["routine", "plan"])]
     counts: bool,
+    /// Print the files that `verify emit` would write for the element in this language, without those that all elements
+    /// share.
+    #[arg(long, value_enum, conflicts_with_all = ["routine", "plan", "counts"])]
+    lang: Option<Language>,
+    /// The precision of all numbers in another language.
+    #[arg(long, value_enum, default_value = "f64", requires = "lang")]
+    precision: Numbers,
 }
 
 impl Show {
     pub fn run(self) -> anyhow::Result<bool> {
+        if let Some(language) = self.lang {
+            let files = sources(&declarations(&self.name)?, language.target(), self.precision.list())?;
+            for file in files.iter().filter(|file| !file.is_shared) {
+                print(&file.text)?;
+            }
+            return Ok(true);
+        }
         for listing in verify_command::listings(&self.name)? {
             match &self.routine {
                 _ if self.plan => print(&listing.plans())?,

@@ -182,7 +182,12 @@ fn store_rest<R: Register<Scalar = f64>>(
 #[inline(always)]
 pub fn gather_4(points: &[[f64; 3]], indices: &[u32]) -> [__m256d; 3] {
     let indices = &indices[..4];
-    let [a, b, c, d] = [0, 1, 2, 3].map(|lane| load_point(&points[indices[lane] as usize]));
+    // Without a closure: it would be compiled for processors without these registers, and called.
+    let mut rows = [load_point(&points[indices[0] as usize]); 4];
+    for lane in 1..4 {
+        rows[lane] = load_point(&points[indices[lane] as usize]);
+    }
+    let [a, b, c, d] = rows;
     // SAFETY: registers exist where the features were detected.
     unsafe {
         let (xz_low, xz_high) = (_mm256_unpacklo_pd(a, b), _mm256_unpacklo_pd(c, d));
