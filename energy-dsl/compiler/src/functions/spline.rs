@@ -53,7 +53,7 @@ fn pieces(g: &mut Graph, values: &[NodeId], knots: &[NodeId]) -> Vec<Piece> {
         .collect();
     let bends = second_derivatives(g, &widths, &rises);
     // The slope at an end is that of the chord, less what the curvature at the other side adds.
-    let mut end_slope = |g: &mut Graph, piece: usize, bend: NodeId, is_last: bool| {
+    let end_slope = |g: &mut Graph, piece: usize, bend: NodeId, is_last: bool| {
         let product = g.mul(widths[piece], bend);
         let added = g.div(product, six);
         if is_last { g.add(rises[piece], added) } else { g.sub(rises[piece], added) }
