@@ -162,6 +162,42 @@ class Elements:
     def jacobian(
         self, u: ArrayLike, *, out: _Two | None = None, flags: bool
     ) -> _Two | tuple[_Array, _Array, _Flags]: ...
+    @overload
+    def next(
+        self, u: ArrayLike, *, out: _Array | None = None, flags: Literal[False] = False
+    ) -> _Array: ...
+    @overload
+    def next(
+        self, u: ArrayLike, *, out: _Array | None = None, flags: Literal[True]
+    ) -> tuple[_Array, _Flags]: ...
+    @overload
+    def next(
+        self, u: ArrayLike, *, out: _Array | None = None, flags: bool
+    ) -> _Array | tuple[_Array, _Flags]: ...
+    @overload
+    def next_jacobians(
+        self, u: ArrayLike, *, out: _Three | None = None, flags: Literal[False] = False
+    ) -> _Three: ...
+    @overload
+    def next_jacobians(
+        self, u: ArrayLike, *, out: _Three | None = None, flags: Literal[True]
+    ) -> tuple[_Array, _Array, _Array, _Flags]: ...
+    @overload
+    def next_jacobians(
+        self, u: ArrayLike, *, out: _Three | None = None, flags: bool
+    ) -> _Three | tuple[_Array, _Array, _Array, _Flags]: ...
+    @overload
+    def state_jacobian(
+        self, u: ArrayLike, *, out: _Two | None = None, flags: Literal[False] = False
+    ) -> _Two: ...
+    @overload
+    def state_jacobian(
+        self, u: ArrayLike, *, out: _Two | None = None, flags: Literal[True]
+    ) -> tuple[_Array, _Array, _Flags]: ...
+    @overload
+    def state_jacobian(
+        self, u: ArrayLike, *, out: _Two | None = None, flags: bool
+    ) -> _Two | tuple[_Array, _Array, _Flags]: ...
 
 @final
 class Element:
@@ -186,6 +222,10 @@ class Element:
     def points(self) -> int: ...
     @property
     def unknowns(self) -> int: ...
+    @property
+    def increments(self) -> int: ...
+    @property
+    def state(self) -> list[str]: ...
     def bind(
         self, count: int, dtype: DTypeLike | None = None, *, threads: int = 1, **inputs: ArrayLike
     ) -> Elements: ...
@@ -310,6 +350,42 @@ class Element:
     ) -> tuple[_Array, _Array, _Flags]: ...
     @overload
     def jacobian(
+        self, u: ArrayLike, *, out: _Two | None = None, flags: bool, **inputs: ArrayLike
+    ) -> _Two | tuple[_Array, _Array, _Flags]: ...
+    @overload
+    def next(
+        self, u: ArrayLike, *, out: _Array | None = None, flags: Literal[False] = False, **inputs: ArrayLike
+    ) -> _Array: ...
+    @overload
+    def next(
+        self, u: ArrayLike, *, out: _Array | None = None, flags: Literal[True], **inputs: ArrayLike
+    ) -> tuple[_Array, _Flags]: ...
+    @overload
+    def next(
+        self, u: ArrayLike, *, out: _Array | None = None, flags: bool, **inputs: ArrayLike
+    ) -> _Array | tuple[_Array, _Flags]: ...
+    @overload
+    def next_jacobians(
+        self, u: ArrayLike, *, out: _Three | None = None, flags: Literal[False] = False, **inputs: ArrayLike
+    ) -> _Three: ...
+    @overload
+    def next_jacobians(
+        self, u: ArrayLike, *, out: _Three | None = None, flags: Literal[True], **inputs: ArrayLike
+    ) -> tuple[_Array, _Array, _Array, _Flags]: ...
+    @overload
+    def next_jacobians(
+        self, u: ArrayLike, *, out: _Three | None = None, flags: bool, **inputs: ArrayLike
+    ) -> _Three | tuple[_Array, _Array, _Array, _Flags]: ...
+    @overload
+    def state_jacobian(
+        self, u: ArrayLike, *, out: _Two | None = None, flags: Literal[False] = False, **inputs: ArrayLike
+    ) -> _Two: ...
+    @overload
+    def state_jacobian(
+        self, u: ArrayLike, *, out: _Two | None = None, flags: Literal[True], **inputs: ArrayLike
+    ) -> tuple[_Array, _Array, _Flags]: ...
+    @overload
+    def state_jacobian(
         self, u: ArrayLike, *, out: _Two | None = None, flags: bool, **inputs: ArrayLike
     ) -> _Two | tuple[_Array, _Array, _Flags]: ...
 

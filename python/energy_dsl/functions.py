@@ -24,6 +24,13 @@ class Kernel:
         self.element = element
         self.name = element.name
         self.is_residual = element.kind == "residual"
+        # Points have three coordinates each, and are not counted among the unknowns.
+        moves_by_addition = element.points > 0 or self.is_residual and element.unknowns == element.increments
+        if not moves_by_addition:
+            raise TypeError(
+                f"{element.name}: a function takes points, or a residual's unknowns without rotations. "
+                "Call the methods of the element instead"
+            )
         self.own = (element.unknowns,) if self.is_residual else (element.points, 3)
         self.inputs: dict[str, Any] = {}
         self.each: set[str] = set()

@@ -3,8 +3,8 @@
 use std::sync::{Arc, Mutex, PoisonError};
 
 use energy_compiler::{Budget, Elements as Tapes, InputKind, InputNumbers, Interpreted, Limits};
-use energy_dsl::RoutineKind;
 use energy_dsl::tape::Column;
+use energy_dsl::{Declaration, RoutineKind};
 use numpy::{PyArrayDescr, PyArrayDescrMethods, PyArrayDyn, PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::exceptions::{PyIndexError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
@@ -111,17 +111,24 @@ pub fn energies(py: Python<'_>, text: &str, file: &str, limits: Option<&Bound<'_
     Ok(elements.into_iter().enumerate().map(element).collect())
 }
 
+/// Returns the declarations of the library.
+fn library() -> impl Iterator<Item = &'static Declaration> {
+    energy_elements::DECLARATIONS.iter().chain(energy_elements::MIXED).copied()
+}
+
 /// Returns the names of the elements of the library, in alphabetical order.
 #[pyfunction]
 pub fn catalogue() -> Vec<&'static str> {
-    energy_elements::DECLARATIONS.iter().map(|declaration| &*declaration.name).collect()
+    let mut names: Vec<&str> = library().map(|declaration| &*declaration.name).collect();
+    names.sort_unstable();
+    names
 }
 
 /// Returns an element of the library; `None` if it has no such element. Its energies, forces and residuals run as
 /// compiled code; with `vertices`, it has routines of single vertices, which run as tapes.
 #[pyfunction]
 pub fn library_element(py: Python<'_>, name: &str, vertices: bool) -> PyResult<Option<Element>> {
-    let Some(declaration) = energy_elements::DECLARATIONS.iter().find(|declaration| declaration.name == name) else {
+    let Some(declaration) = library().find(|declaration| declaration.name == name) else {
         return Ok(None);
     };
     let compile = || match vertices {
@@ -183,16 +190,29 @@ impl Element {
         self.inner.inputs().iter().map(input).collect()
     }
 
-    /// Number of points of one element; 0 for a residual.
+    /// Number of points of one element; 0 if its unknowns are flat.
     #[getter]
     fn points(&self) -> usize {
         self.point_count()
     }
 
-    /// Number of unknowns of a residual.
+    /// Count of numbers of the unknowns, if they are flat: those of a residual, or unknowns that are not only points.
     #[getter]
     fn unknowns(&self) -> usize {
         self.unknown_count()
+    }
+
+    /// Count of coordinates in which the unknowns move: the columns of derivatives. A rotation has four numbers and three
+    /// increments.
+    #[getter]
+    fn increments(&self) -> usize {
+        self.inner.declaration().increments()
+    }
+
+    /// Names of the inputs that are the state of an element, which `next` computes anew.
+    #[getter]
+    fn state(&self) -> Vec<String> {
+        self.inner.declaration().state.iter().map(|field| field.name.to_string()).collect()
     }
 
     fn __repr__(&self) -> String {
@@ -276,6 +296,23 @@ impl Element {
 
     pub fn unknown_count(&self) -> usize {
         count(&self.inner, InputKind::Unknown)
+    }
+
+    /// Returns the number of vertices whose coordinates are the unknowns of one element.
+    pub fn vertices_of_one(&self) -> PyResult<usize> {
+        let declaration = self.inner.declaration();
+        let (name, unknowns) = (&declaration.name, self.unknown_count());
+        if declaration.is_mixed() || unknowns > 0 && unknowns != declaration.increments() {
+            let message = format!(
+                "{name}: a system moves vertices, and the unknowns of this {} are not only points of its own",
+                declaration.kind.keyword()
+            );
+            return Err(PyTypeError::new_err(message));
+        }
+        if unknowns.is_multiple_of(3) {
+            return Ok(if unknowns > 0 { unknowns / 3 } else { self.point_count() });
+        }
+        Err(PyTypeError::new_err(format!("{name}: expected three unknowns for each vertex, got {unknowns} unknowns")))
     }
 
     /// Binds inputs as tapes of one precision.
@@ -402,8 +439,16 @@ evaluations! {
     constraint(x) => ConstraintJacobian;
     /// Returns r(u), of shape (n, rows), for unknowns of shape (n, unknowns).
     residual(u) => Residual;
-    /// Returns r and ∂r/∂u, of shape (n, rows, unknowns).
+    /// Returns r and ∂r/∂u, of shape (n, rows, increments).
     jacobian(u) => Jacobian;
+    /// Returns the state after a step that ends at u, of shape (n, states).
+    next(u) => Next;
+    /// Returns the state after a step, and its derivatives by the unknowns and by the state before, of shape
+    /// (n, states, increments) and (n, states, states).
+    next_jacobians(u) => NextJacobians;
+    /// Returns ∂U/∂u, of shape (n, increments), and ∂²U/∂u∂(state), of shape (n, increments, states); of a residual r and
+    /// ∂r/∂(state).
+    state_jacobian(u) => StateJacobian;
 }
 
 #[pymethods]
@@ -450,7 +495,9 @@ impl Element {
             return Ok(routine);
         }
         let remedy = match self.origin {
-            _ if !matches!(self.kind(), "energy" | "constraint") => "only energies and constraints have them".to_owned(),
+            _ if !matches!(self.kind(), "energy" | "constraint") => {
+                "only energies and constraints have them".to_owned()
+            }
             Origin::Library => format!("get it by element(\"{name}\", vertices=True)"),
             Origin::Text(..) => format!("declare it as `#[vertex] {} {name}`", self.kind()),
         };

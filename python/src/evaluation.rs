@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use energy_compiler::{Elements as Tapes, EvaluateError, InputKind, Interpreted};
 use energy_dsl::tape::TAPE_BLOCK;
-use energy_dsl::{Flagged, RoutineKind};
+use energy_dsl::{Flagged, Kind, RoutineKind};
 use numpy::{PyArray1, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
@@ -168,9 +168,9 @@ impl<S: Precision> Batch<S> {
 
     fn evaluate<'py>(&self, request: &Request<'_, 'py>) -> PyResult<Bound<'py, PyAny>> {
         let &Request { routine, x, v, out, flags } = request;
-        let (py, expected) = (x.py(), self.sizes.input(routine));
-        let name = if matches!(routine, RoutineKind::Residual | RoutineKind::Jacobian) { "u" } else { "x" };
-        let input = |name, value| {
+        let py = x.py();
+        let name = if self.sizes.unknowns > 0 { "u" } else { "x" };
+        let input = |name, value, expected: Shape| {
             let array = array::<S>(name, value)?;
             if array.shape() == &expected[..] {
                 Ok(array)
@@ -178,7 +178,7 @@ impl<S: Precision> Batch<S> {
                 Err(wrong_shape(name, &tuple(&expected), array.shape()))
             }
         };
-        let (x, v) = (input(name, x)?, v.map(|v| input("v", v)).transpose()?);
+        let (x, v) = (input(name, x, self.sizes.input())?, v.map(|v| input("v", v, self.sizes.vectors())).transpose()?);
         let (x, v) = (numbers(name, &x)?, v.as_ref().map(|v| numbers("v", v)).transpose()?.unwrap_or(&[]));
         let (slots, used) = self.sizes.slots(routine);
         let arrays = outputs::<S>(py, &slots[..used], out)?;
@@ -266,6 +266,9 @@ impl<S: Precision> Batch<S> {
             (RoutineKind::ConstraintJacobian, [c, j]) => tapes.constraints(all, x, c, j),
             (RoutineKind::Residual, [r]) => tapes.residuals(all, x, r),
             (RoutineKind::Jacobian, [r, j]) => tapes.jacobians(all, x, r, j),
+            (RoutineKind::Next, [state]) => tapes.next_states(all, x, state),
+            (RoutineKind::NextJacobians, [state, by_u, by_s]) => tapes.next_jacobians(all, x, state, by_u, by_s),
+            (RoutineKind::StateJacobian, [slopes, by_s]) => tapes.state_jacobians(all, x, slopes, by_s),
             _ => unreachable!("as many slots as results"),
         }
     }
@@ -276,27 +279,54 @@ struct Sizes {
     count: usize,
     points: usize,
     rows: usize,
+    /// Numbers that hold the unknowns, if these are flat.
     unknowns: usize,
+    /// Coordinates in which the unknowns move.
+    increments: usize,
+    states: usize,
+    /// First derivatives that depend on the state.
+    slopes: usize,
+    is_mixed: bool,
 }
 
 impl Sizes {
     fn of(element: &Interpreted, elements: usize) -> Self {
-        let (points, unknowns) = (count(element, InputKind::Point) / 3, count(element, InputKind::Unknown));
-        Self { count: elements, points, rows: element.declaration().rows, unknowns }
+        let declaration = element.declaration();
+        let increments = declaration.increments();
+        Self {
+            count: elements,
+            points: count(element, InputKind::Point) / 3,
+            rows: declaration.rows,
+            unknowns: count(element, InputKind::Unknown),
+            increments,
+            states: declaration.state.iter().map(|field| field.size).sum(),
+            slopes: if declaration.kind == Kind::Residual { declaration.rows } else { increments },
+            is_mixed: declaration.is_mixed(),
+        }
     }
 
-    fn input(&self, routine: RoutineKind) -> Shape {
-        match routine {
-            RoutineKind::Residual | RoutineKind::Jacobian => [self.count, self.unknowns].into(),
-            _ => [self.count, self.points, 3].into(),
+    /// Returns the shape of the unknowns.
+    fn input(&self) -> Shape {
+        match self.unknowns {
+            0 => [self.count, self.points, 3].into(),
+            unknowns => [self.count, unknowns].into(),
+        }
+    }
+
+    /// Returns the shape of first derivatives, forces and velocities: by points, or by increments.
+    fn vectors(&self) -> Shape {
+        match self.is_mixed {
+            true => [self.count, self.increments].into(),
+            false => [self.count, self.points, 3].into(),
         }
     }
 
     /// Returns the results of a routine; only the given number of them counts.
     fn slots(&self, routine: RoutineKind) -> ([Slot; 3], usize) {
-        let (n, p, rows) = (self.count, self.points, self.rows);
+        let (n, rows, columns, states) = (self.count, self.rows, self.increments, self.states);
         let slot = |name, shape: Shape| Slot { name, shape };
-        let (vectors, matrix) = (Shape::from([n, p, 3]), Shape::from([n, 3 * p, 3 * p]));
+        let (vectors, matrix) = (self.vectors(), Shape::from([n, columns, columns]));
+        let state = slot("state", [n, states].into());
         let unused = slot("", [0].into());
         let (energy, gradient) = (slot("U", [n].into()), slot("gradient", vectors));
         let residual = slot("residual", [n, rows].into());
@@ -308,7 +338,7 @@ impl Sizes {
             RoutineKind::Force => ([slot("force", vectors), unused, unused], 1),
             RoutineKind::Jacobians => ([slot("force", vectors), slot("∂f/∂x", matrix), slot("∂f/∂v", matrix)], 3),
             RoutineKind::ConstraintJacobian => {
-                ([slot("C", [n, rows].into()), slot("Jacobian", [n, rows, 3 * p].into()), unused], 2)
+                ([slot("C", [n, rows].into()), slot("Jacobian", [n, rows, columns].into()), unused], 2)
             }
             RoutineKind::Residual => ([residual, unused, unused], 1),
             RoutineKind::Rest
@@ -316,7 +346,16 @@ impl Sizes {
             | RoutineKind::ConstraintHessian
             | RoutineKind::GaussNewton => ([unused; 3], 0),
             RoutineKind::Vertex(_) => ([energy, slot("gradient", [n, 3].into()), slot("block", [n, 3, 3].into())], 3),
-            RoutineKind::Jacobian => ([residual, slot("Jacobian", [n, rows, self.unknowns].into()), unused], 2),
+            RoutineKind::Jacobian => ([residual, slot("Jacobian", [n, rows, columns].into()), unused], 2),
+            RoutineKind::Next => ([state, unused, unused], 1),
+            RoutineKind::NextJacobians => {
+                let by_unknowns = slot("Jacobian by unknowns", [n, states, columns].into());
+                ([state, by_unknowns, slot("Jacobian by state", [n, states, states].into())], 3)
+            }
+            RoutineKind::StateJacobian => {
+                let slopes = slot("slopes", [n, self.slopes].into());
+                ([slopes, slot("Jacobian by state", [n, self.slopes, states].into()), unused], 2)
+            }
         }
     }
 }

@@ -186,3 +186,54 @@ def test_repeated_calls_follow_their_parameters():
         spring.value(x, K=1.0)
     with pytest.raises(ValueError, match="NaN"):
         spring.value(x, K=float("nan"), L=1.0)
+
+
+def test_unknowns_of_any_type():
+    """Rotations have four numbers and three increments; derivatives are by these."""
+    text = """
+    energy Aim(q: Rotation, s: Scalar; d, n: Vec3, k: Scalar) { k / 2 * norm_squared(s * rotate(q, d) - n) }
+    force Drag(_x: Point, q: Rotation, v: Velocity, w: Velocity; c: Scalar, d: Vec3) { [-c * v, rotate(q, d) - c * w] }
+    """
+    aim, drag = ed.energies(text)
+    assert (aim.points, aim.unknowns, aim.increments, aim.state) == (0, 5, 4, [])
+    half = np.sqrt(0.5)
+    u = np.array([[1, 0, 0, 0, 2.0], [half, 0, 0, half, 1.0]])
+    inputs = {"d": [1.0, 0, 0], "n": [0.0, 1, 0], "k": 3.0}
+    energy, gradient, hessian = aim.hessian(u, **inputs)
+    assert (gradient.shape, hessian.shape) == ((2, 4), (2, 4, 4))
+    np.testing.assert_allclose(energy, [7.5, 0], atol=1e-15)
+    # Turned by a quarter about z, d points along n: nothing is left to turn.
+    np.testing.assert_allclose(gradient[1], 0, atol=1e-15)
+    np.testing.assert_array_equal(hessian, hessian.transpose(0, 2, 1))
+    v = np.array([[0.0, 0, 0.5, 1], [1, 2, 3, 4]])
+    np.testing.assert_allclose(aim.hessian_vector(u, v, **inputs), np.einsum("eij,ej->ei", hessian, v), rtol=1e-13)
+    x = np.array([[0.0, 0, 0, 1, 0, 0, 0]])
+    force, by_u, by_v = drag.force_jacobians(x, np.ones((1, 6)), c=2.0, d=[1.0, 0, 0])
+    np.testing.assert_array_equal(force, [[-2, -2, -2, -1, -2, -2]])
+    assert (by_u.shape, by_v.shape) == ((1, 6, 6), (1, 6, 6))
+    with pytest.raises(ValueError, match=r"u: expected .*\(2, 5\)"):
+        aim.energy(u[:, :4].repeat(1, axis=0), **inputs)
+    with pytest.raises(TypeError, match="not only points of its own"):
+        ed.System(3).add(aim, [[0]], **inputs)
+
+
+def test_states_go_on():
+    """A spring that yields keeps its permanent elongation."""
+    text = """
+    energy Plastic(x, y: Point; state e: Scalar[m]; k: Scalar[N/m], Y: Scalar[N]) {
+        let trial = norm(x - y) - 1 * e;
+        next { e = if k * trial > Y { trial + e - Y / k } else { e }; }
+        k / 2 * trial^2
+    }
+    """
+    [spring] = ed.energies(text)
+    assert spring.state == ["e"]
+    x = np.array([[[0.0, 0, 0], [1.2, 0, 0]], [[0, 0, 0], [1.01, 0, 0]]])
+    state = spring.next(x, e=[1.0, 1.0], k=10.0, Y=0.5)
+    np.testing.assert_allclose(state, [[1.15], [1.0]], rtol=1e-15)
+    _, by_x, by_e = spring.next_jacobians(x, e=[1.0, 1.0], k=10.0, Y=0.5)
+    assert (by_x.shape, by_e.shape) == ((2, 1, 6), (2, 1, 1))
+    np.testing.assert_array_equal(by_e[:, 0, 0], [0, 1])
+    slopes, by_e = spring.state_jacobian(x, e=state[:, 0], k=10.0, Y=0.5)
+    np.testing.assert_allclose(slopes[0], [-0.5, 0, 0, 0.5, 0, 0], atol=1e-14)
+    np.testing.assert_allclose(by_e[0, :, 0], [10, 0, 0, -10, 0, 0], atol=1e-13)

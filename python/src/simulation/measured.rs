@@ -38,9 +38,8 @@ fn recorded(folder: &std::path::Path) -> PyResult<Measurements> {
 pub fn measurement_columns(py: Python<'_>, folder: PathBuf) -> PyResult<Columns<'_>> {
     let all = recorded(&folder)?;
     let rows: Vec<Vec<f64>> = all.readings.iter().map(|reading| all.row(reading)).collect();
-    let column = |(number, name): (usize, String)| {
-        (name, PyArray1::from_vec(py, rows.iter().map(|row| row[number]).collect()))
-    };
+    let column =
+        |(number, name): (usize, String)| (name, PyArray1::from_vec(py, rows.iter().map(|row| row[number]).collect()));
     Ok(all.columns().into_iter().enumerate().map(column).collect())
 }
 

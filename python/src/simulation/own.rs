@@ -48,14 +48,7 @@ impl OwnText {
         vertices: usize,
     ) -> PyResult<Self> {
         let py = stencils.py();
-        let points = match element.inner.declaration().kind {
-            Kind::Residual if element.unknown_count().is_multiple_of(3) => element.unknown_count() / 3,
-            Kind::Residual => {
-                let message = format!("{name}: expected three unknowns for each vertex");
-                return Err(PyTypeError::new_err(message));
-            }
-            _ => element.point_count(),
-        };
+        let points = element.vertices_of_one()?;
         let stencils = stencils_of(stencils, points, vertices)?;
         let elements = element.tapes(py, stencils.len() / points.max(1), Some(inputs))?;
         Ok(Self {

@@ -116,15 +116,7 @@ impl System {
         inputs: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<usize> {
         let declaration = element.inner.declaration();
-        let points = match declaration.kind {
-            Kind::Residual if element.unknown_count().is_multiple_of(3) => element.unknown_count() / 3,
-            Kind::Residual => {
-                let (name, found) = (&declaration.name, element.unknown_count());
-                let message = format!("{name}: expected three unknowns for each vertex, got {found} unknowns");
-                return Err(PyTypeError::new_err(message));
-            }
-            _ => element.point_count(),
-        };
+        let points = element.vertices_of_one()?;
         let vertices = stencils_of(stencils, points, self.vertices)?;
         let elements = element.tapes::<f64>(py, vertices.len() / points.max(1), inputs)?;
         let inputs = copied(py, inputs)?;
