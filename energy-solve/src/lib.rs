@@ -66,10 +66,13 @@ pub use least_squares::{
     TermSum,
 };
 pub use linear::{
-    BlockCholesky, CholeskyError, Multigrid, OverRelaxation, SingularBlock, SolveOptions, SolveReport, StopReason,
-    bicgstab,
+    BandFactor, BandOrder, BlockCholesky, BorderedError, BorderedSolver, CholeskyError, KindSolver, Multigrid,
+    OverRelaxation, SingularBlock, SingularPivot, SolveOptions, SolveReport, StopReason, bicgstab,
 };
-pub use matrix::{BlockMatrix, Blocks, Bsr, Csr, DofMap, Pattern, Precision, Storage, dot, index};
+pub use matrix::{
+    BlockMatrix, Blocks, BorderedMatrix, Bsr, Csr, DofMap, KindMatrix, KindPattern, Pattern, Precision, Storage, dot,
+    index,
+};
 pub use system::{EvaluationError, LinearisationOptions, LinearisedForces, System, SystemError, TermEnergy};
 pub use terms::{
     Character, Counts, Curvature, DissipationLaw, DissipationTerm, Divisible, DrivenLaw, DrivenTerm, ElementList,
