@@ -52,6 +52,7 @@ mod contact;
 mod least_squares;
 mod linear;
 mod matrix;
+mod mixed;
 mod system;
 mod terms;
 pub mod threads;
@@ -72,6 +73,11 @@ pub use linear::{
 pub use matrix::{
     BlockMatrix, Blocks, BorderedMatrix, Bsr, Csr, DofMap, KindMatrix, KindPattern, Pattern, Precision, Storage, dot,
     index,
+};
+pub use mixed::{
+    ElementStates, Extremum, Inertia, MixedBody, MixedEnergy, MixedError, MixedIntegrator, MixedNewton,
+    MixedNewtonError, MixedNewtonOptions, MixedNewtonReport, MixedScheme, MixedState, MixedStop, MixedSystem,
+    MixedTerm, UnknownKind,
 };
 pub use system::{EvaluationError, LinearisationOptions, LinearisedForces, System, SystemError, TermEnergy};
 pub use terms::{

@@ -170,7 +170,7 @@ impl Band {
 ///
 /// # Errors
 /// If the block is not negative definite.
-pub(super) fn concave(matrix: &BorderedMatrix) -> Result<(DenseFactor, usize), BorderedError> {
+pub(crate) fn concave(matrix: &BorderedMatrix) -> Result<(DenseFactor, usize), BorderedError> {
     let maximised = matrix.maximised.iter().filter(|is| **is).count();
     let block = matrix.part_of_corner(true, true);
     let factor = DenseFactor::new(block, maximised).map_err(|_| BorderedError::NotConcave)?;

@@ -3,8 +3,8 @@
 mod band;
 mod bicgstab;
 mod block_cholesky;
-mod block_jacobi;
-mod bordered;
+pub(crate) mod block_jacobi;
+pub(crate) mod bordered;
 pub(crate) mod conjugate_gradients;
 mod dense_factor;
 mod domains;

@@ -1,0 +1,266 @@
+//! Inertia, and the potential whose minimum is a time step.
+
+use energy_dsl::{Block, Vector3};
+
+use super::body::{MixedBody, UnknownKind};
+use super::error::MixedError;
+use super::rotation::{self, Quaternion};
+use super::scatter::Rows;
+use super::system::MixedEnergy;
+use crate::linear::block_jacobi::inverse;
+use crate::matrix::BorderedMatrix;
+use crate::terms::Curvature;
+
+/// The inertia of an unknown.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Inertia {
+    /// None: the unknown is in equilibrium with the others at all times.
+    #[default]
+    None,
+    /// A mass m, in kg, of a point; or the moment of inertia, in kg m², of an angle: ρ I_p times the length of a rod
+    /// for its twist.
+    Mass(f64),
+    /// The inertia tensor of a rigid body about its centre of mass, in kg m², in the body's frame: that in space is R J
+    /// Rᵀ.
+    Tensor(Block<f64>),
+}
+
+/// Checks that each unknown has an inertia of its kind.
+pub(super) fn check(body: &MixedBody, inertia: &[Inertia]) -> Result<(), MixedError> {
+    if inertia.len() != body.len() {
+        let (what, expected, found) = ("inertias", body.len(), inertia.len());
+        return Err(MixedError::WrongLength { what, expected, found });
+    }
+    for (unknown, given) in inertia.iter().enumerate() {
+        let (fits, expected) = match (body.kind(unknown), given) {
+            (_, Inertia::None) => (true, ""),
+            (UnknownKind::Rotation, Inertia::Tensor(tensor)) => {
+                (is_positive_definite(tensor), "a symmetric positive definite tensor")
+            }
+            (UnknownKind::Rotation, Inertia::Mass(_)) => (false, "an inertia tensor"),
+            (_, Inertia::Mass(mass)) => (mass.is_finite() && *mass >= 0.0, "a finite mass of 0 or more"),
+            (_, Inertia::Tensor(_)) => (false, "a mass"),
+        };
+        if !fits {
+            return Err(MixedError::WrongInertia { unknown, expected, found: format!("{given:?}") });
+        }
+    }
+    Ok(())
+}
+
+fn is_positive_definite(j: &Block<f64>) -> bool {
+    let symmetric = (0..3).all(|row| (0..row).all(|column| j[row][column] == j[column][row]));
+    let minor = j[0][0] * j[1][1] - j[0][1] * j[1][0];
+    let determinant = j[0][0] * (j[1][1] * j[2][2] - j[1][2] * j[2][1])
+        - j[0][1] * (j[1][0] * j[2][2] - j[1][2] * j[2][0])
+        + j[0][2] * (j[1][0] * j[2][1] - j[1][1] * j[2][0]);
+    symmetric && j[0][0] > 0.0 && minor > 0.0 && determinant > 0.0 && inverse(j).is_some()
+}
+
+/// Σ ½ m ‖x − x̃‖²/τ² over flat unknowns and Σ (2/τ²) vᵀ J v over rotations, where v is the vector part of q q̃⁻¹.
+///
+/// x̃ and q̃ are where free motion leads within the time τ. For a small difference φ of rotations, v = φ/2: the potential
+/// is ½ φᵀ J φ/τ², like that of points. Its gradient times τ is the change of momentum within the step.
+#[derive(Debug)]
+pub(super) struct InertialPotential {
+    time: f64,
+    predictions: Vec<(usize, Prediction)>,
+}
+
+/// Where free motion leads.
+#[derive(Clone, Copy, Debug)]
+enum Prediction {
+    Flat { mass: f64, size: usize, at: Vector3<f64> },
+    Turned { tensor: Block<f64>, at: Quaternion },
+}
+
+impl InertialPotential {
+    /// Creates the potential of a step of length `time` from u with these rates. `reference` is the time, as a fraction of
+    /// the step, at which the inertia tensor gives the angular velocity: ½ is the midpoint rule.
+    pub(super) fn new(
+        body: &MixedBody,
+        inertia: &[Inertia],
+        (u, rates): (&[f64], &[f64]),
+        time: f64,
+        reference: f64,
+    ) -> Self {
+        let mut predictions = Vec::with_capacity(inertia.len());
+        for (index, (unknown, inertia)) in body.all().iter().zip(inertia).enumerate() {
+            let (u, rates) = (&u[unknown.number..], &rates[unknown.increment..]);
+            let prediction = match *inertia {
+                _ if unknown.fixed => continue,
+                Inertia::None => continue,
+                Inertia::Mass(mass) => {
+                    let size = unknown.kind.increments();
+                    let at = std::array::from_fn(|i| if i < size { u[i] + time * rates[i] } else { 0.0 });
+                    Prediction::Flat { mass, size, at }
+                }
+                Inertia::Tensor(tensor) => {
+                    let (q, rate) = (std::array::from_fn(|i| u[i]), std::array::from_fn(|i| rates[i]));
+                    let at = free_rotation(&tensor, q, rate, time, reference);
+                    Prediction::Turned { tensor: rotation::turned(&tensor, at), at }
+                }
+            };
+            predictions.push((index, prediction));
+        }
+        Self { time, predictions }
+    }
+
+    /// Adds the energy.
+    pub(super) fn add_energy(&self, body: &MixedBody, u: &[f64], sum: &mut MixedEnergy) {
+        for (unknown, prediction) in &self.predictions {
+            let own = &u[body.first_number(*unknown)..];
+            sum.add(match prediction {
+                Prediction::Flat { mass, size, at } => {
+                    let square: f64 = own[..*size].iter().zip(at).map(|(x, at)| (x - at) * (x - at)).sum();
+                    0.5 * mass * square / (self.time * self.time)
+                }
+                Prediction::Turned { tensor, at } => {
+                    let (_, v) = difference(own, *at);
+                    2.0 * dot(v, times(tensor, v)) / (self.time * self.time)
+                }
+            });
+        }
+    }
+
+    /// Adds energy and gradient, and the Hessian to `matrix`. A `curvature` other than exact leaves out the only term that
+    /// may be negative, −¼ (vᵀ J v) 1.
+    pub(super) fn add(
+        &self,
+        body: &MixedBody,
+        u: &[f64],
+        (sum, gradient): (&mut MixedEnergy, &mut [f64]),
+        into: Option<(&Rows, &mut BorderedMatrix, Curvature)>,
+    ) {
+        self.add_energy(body, u, sum);
+        let squared = self.time * self.time;
+        let mut into = into;
+        for (unknown, prediction) in &self.predictions {
+            let own = &u[body.first_number(*unknown)..];
+            let to = &mut gradient[body.first_increment(*unknown)..];
+            let mut hessian = [[0.0; 3]; 3];
+            match prediction {
+                Prediction::Flat { mass, size, at } => {
+                    for i in 0..*size {
+                        to[i] += mass * (own[i] - at[i]) / squared;
+                        hessian[i][i] = mass / squared;
+                    }
+                }
+                Prediction::Turned { tensor, at } => {
+                    let (w, v) = difference(own, *at);
+                    let product = times(tensor, v);
+                    let g = derivative(w, v);
+                    let along = if into.as_ref().is_some_and(|(.., curvature)| *curvature == Curvature::Exact) {
+                        0.25 * dot(v, product)
+                    } else {
+                        0.0
+                    };
+                    for i in 0..3 {
+                        to[i] += 4.0 * (0..3).map(|k| g[k][i] * product[k]).sum::<f64>() / squared;
+                        for j in 0..3 {
+                            let column = times(tensor, [g[0][j], g[1][j], g[2][j]]);
+                            let square: f64 = (0..3).map(|k| g[k][i] * column[k]).sum();
+                            hessian[i][j] = 4.0 * (square - if i == j { along } else { 0.0 }) / squared;
+                        }
+                    }
+                }
+            }
+            if let Some((rows, matrix, _)) = &mut into {
+                let row = rows.of[*unknown].expect("a fixed unknown has no prediction") as usize;
+                matrix.kinds.add(row, row, |i, j| hessian[i.min(j)][i.max(j)]);
+            }
+        }
+    }
+
+    /// Returns the rates at the end of a step that lasts `time` and whose forces are those at the minimum: the rates
+    /// before, plus the impulse over the inertia. Unknowns without inertia get their mean rate.
+    pub(super) fn rates_after(
+        &self,
+        body: &MixedBody,
+        inertia: &[Inertia],
+        (before, rates): (&[f64], &[f64]),
+        (minimum, end): (&[f64], &[f64]),
+        time: f64,
+    ) -> Vec<f64> {
+        let mut after = mean_rates(body, before, end, time);
+        let mut impulse = vec![0.0; body.increments()];
+        self.add(body, minimum, (&mut MixedEnergy::default(), &mut impulse), None);
+        impulse.iter_mut().for_each(|entry| *entry *= time);
+        for (unknown, prediction) in &self.predictions {
+            let (number, first) = (body.first_number(*unknown), body.first_increment(*unknown));
+            match (prediction, inertia[*unknown]) {
+                (Prediction::Flat { mass, size, .. }, _) if *mass > 0.0 => {
+                    (first..first + size).for_each(|i| after[i] = rates[i] + impulse[i] / mass);
+                }
+                (Prediction::Turned { .. }, Inertia::Tensor(tensor)) => {
+                    let q = |u: &[f64]| std::array::from_fn(|i| u[number + i]);
+                    let momentum =
+                        times(&rotation::turned(&tensor, q(before)), std::array::from_fn(|i| rates[first + i]));
+                    let momentum = std::array::from_fn(|i| momentum[i] + impulse[first + i]);
+                    after[first..first + 3].copy_from_slice(&angular_velocity(&tensor, q(end), momentum));
+                }
+                _ => {}
+            }
+        }
+        after
+    }
+}
+
+/// Returns the moves from one configuration to another over the time between them.
+pub(super) fn mean_rates(body: &MixedBody, from: &[f64], to: &[f64], time: f64) -> Vec<f64> {
+    let mut rates = vec![0.0; body.increments()];
+    for unknown in body.all() {
+        let (from, to) = (&from[unknown.number..], &to[unknown.number..]);
+        let rates = &mut rates[unknown.increment..][..unknown.kind.increments()];
+        if unknown.kind == UnknownKind::Rotation {
+            let [from, to]: [Quaternion; 2] = [from, to].map(|q| std::array::from_fn(|i| q[i]));
+            let turn = rotation::logarithm(rotation::product(to, rotation::inverse(from)));
+            rates.iter_mut().zip(turn).for_each(|(rate, turn)| *rate = turn / time);
+        } else {
+            rates.iter_mut().zip(from).zip(to).for_each(|((rate, from), to)| *rate = (to - from) / time);
+        }
+    }
+    rates
+}
+
+/// Returns the scalar part and the vector part of q q̃⁻¹.
+fn difference(q: &[f64], at: Quaternion) -> (f64, Vector3<f64>) {
+    let [w, x, y, z] = rotation::product(std::array::from_fn(|i| q[i]), rotation::inverse(at));
+    (w, [x, y, z])
+}
+
+/// Returns ∂v/∂δ = ½ (w 1 − [v]×) of the vector part of exp(δ) d.
+fn derivative(w: f64, [x, y, z]: Vector3<f64>) -> Block<f64> {
+    [[w, z, -y], [-z, w, x], [y, -x, w]].map(|row| row.map(|entry| 0.5 * entry))
+}
+
+/// Returns where a rotation without torque is after some time: exp(t ω) q, where the angular momentum is R J Rᵀ ω at the
+/// reference. Solved by fixed-point iteration, which contracts while the turn is well below a radian.
+fn free_rotation(tensor: &Block<f64>, q: Quaternion, rate: Vector3<f64>, time: f64, reference: f64) -> Quaternion {
+    let momentum = times(&rotation::turned(tensor, q), rate);
+    let mut mean = rate;
+    for _ in 0..50 {
+        let at = rotation::moved(q, mean.map(|c| reference * time * c));
+        let next = angular_velocity(tensor, at, momentum);
+        let change = rotation::length(std::array::from_fn(|i| next[i] - mean[i]));
+        mean = next;
+        if change <= 1e-15 * rotation::length(mean) {
+            break;
+        }
+    }
+    rotation::moved(q, mean.map(|c| time * c))
+}
+
+/// Returns (R J Rᵀ)⁻¹ ℓ.
+fn angular_velocity(tensor: &Block<f64>, q: Quaternion, momentum: Vector3<f64>) -> Vector3<f64> {
+    let inverse = inverse(tensor).expect("tensors were checked");
+    times(&rotation::turned(&inverse, q), momentum)
+}
+
+fn times(matrix: &Block<f64>, v: Vector3<f64>) -> Vector3<f64> {
+    matrix.map(|row| dot(row, v))
+}
+
+fn dot(a: Vector3<f64>, b: Vector3<f64>) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
