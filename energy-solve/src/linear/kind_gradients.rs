@@ -1,6 +1,6 @@
 //! Conjugate gradients over unknowns of different sizes, with a border.
 
-use crate::linear::block_jacobi::inverse;
+use crate::linear::block_jacobi::{inverse, is_positive_definite};
 use crate::linear::bordered::{BorderedError, concave};
 use crate::linear::conjugate_gradients::{Steps, conjugate_gradients};
 use crate::linear::dense_factor::DenseFactor;
@@ -111,7 +111,8 @@ impl<'a> Reduced<'a> {
         self.subtract_coupled(&values, y);
     }
 
-    /// Returns the inverse diagonal blocks: one per unknown, then one per minimised increment.
+    /// Returns the inverse diagonal blocks: one per unknown, then one per minimised increment. They are positive definite
+    /// if the matrix is.
     fn inverse_diagonal(&self) -> Result<Vec<Inverse>, BorderedError> {
         let pattern = self.matrix.kinds.pattern();
         let own = (0..pattern.unknowns()).map(|unknown| {
@@ -127,6 +128,9 @@ impl<'a> Reduced<'a> {
             self.subtract_eliminated(&mut block, &rows);
             let largest = block.iter().flatten().fold(0.0_f64, |largest, entry| largest.max(entry.abs()));
             (size..3).for_each(|row| block[row][row] = largest);
+            if !is_positive_definite(&block) {
+                return Err(BorderedError::Indefinite);
+            }
             inverse(&block).ok_or(BorderedError::Singular(SingularPivot { unknown: number }))
         };
         own.chain(shared).enumerate().map(inverted).collect()

@@ -7,7 +7,7 @@ use super::error::MixedError;
 use super::rotation::{self, Quaternion};
 use super::scatter::Rows;
 use super::system::MixedEnergy;
-use crate::linear::block_jacobi::inverse;
+use crate::linear::block_jacobi::{inverse, is_positive_definite};
 use crate::matrix::BorderedMatrix;
 use crate::terms::Curvature;
 
@@ -35,7 +35,7 @@ pub(super) fn check(body: &MixedBody, inertia: &[Inertia]) -> Result<(), MixedEr
         let (fits, expected) = match (body.kind(unknown), given) {
             (_, Inertia::None) => (true, ""),
             (UnknownKind::Rotation, Inertia::Tensor(tensor)) => {
-                (is_positive_definite(tensor), "a symmetric positive definite tensor")
+                (is_inertia(tensor), "a symmetric positive definite tensor")
             }
             (UnknownKind::Rotation, Inertia::Mass(_)) => (false, "an inertia tensor"),
             (_, Inertia::Mass(mass)) => (mass.is_finite() && *mass >= 0.0, "a finite mass of 0 or more"),
@@ -48,13 +48,10 @@ pub(super) fn check(body: &MixedBody, inertia: &[Inertia]) -> Result<(), MixedEr
     Ok(())
 }
 
-fn is_positive_definite(j: &Block<f64>) -> bool {
-    let symmetric = (0..3).all(|row| (0..row).all(|column| j[row][column] == j[column][row]));
-    let minor = j[0][0] * j[1][1] - j[0][1] * j[1][0];
-    let determinant = j[0][0] * (j[1][1] * j[2][2] - j[1][2] * j[2][1])
-        - j[0][1] * (j[1][0] * j[2][2] - j[1][2] * j[2][0])
-        + j[0][2] * (j[1][0] * j[2][1] - j[1][1] * j[2][0]);
-    symmetric && j[0][0] > 0.0 && minor > 0.0 && determinant > 0.0 && inverse(j).is_some()
+/// Whether a tensor is symmetric, positive definite, and invertible in double precision.
+fn is_inertia(tensor: &Block<f64>) -> bool {
+    let symmetric = (0..3).all(|row| (0..row).all(|column| tensor[row][column] == tensor[column][row]));
+    symmetric && is_positive_definite(tensor) && inverse(tensor).is_some()
 }
 
 /// Σ ½ m ‖x − x̃‖²/τ² over flat unknowns and Σ (2/τ²) vᵀ J v over rotations, where v is the vector part of q q̃⁻¹.

@@ -48,7 +48,8 @@ impl MixedNewtonOptions {
 pub enum MixedStop {
     /// A full Newton step with a positive definite exact Hessian met the tolerance.
     Converged,
-    /// The gradient vanishes, but the Hessian has a negative eigenvalue: an equilibrium that is not stable.
+    /// The gradient vanishes, but the Hessian is not positive definite: an equilibrium that is not stable, or that can move
+    /// without a change of energy.
     Saddle,
     /// No step lowers the energy by more than rounding.
     Stalled,
