@@ -28,6 +28,17 @@
 //!
 //! Contact is not a sum of fixed elements: see [`ContactModel`] and [`OverRelaxation::scale_with_contacts`].
 //!
+//! # Unknowns that are not only points
+//!
+//! A [`MixedBody`] has scalars (twist angles), vectors of 2 and 3, rotations, and unknowns that all elements share (a
+//! pressure). A [`MixedSystem`] sums [`MixedTerm`]s over it: potentials of mixed unknowns, with or without a state, and
+//! those of points. It returns U, ∂U/∂u by increments, and ∂²U/∂u² as a [`BorderedMatrix`]: a [`KindMatrix`], whose blocks
+//! have the sizes of their unknowns, and dense rows for shared ones. [`MixedNewton`] finds equilibria, and
+//! [`MixedIntegrator`] takes time steps with masses and inertia tensors. [`BorderedSolver`] solves the linear systems, by
+//! a [`BandFactor`] for chains such as rods, otherwise by conjugate gradients.
+//!
+//! # Least squares
+//!
 //! A [`GaussNewton`] solver minimises sums of squared residuals ([`ResidualTerm`]) over blocks of unknowns.
 //!
 //! ```

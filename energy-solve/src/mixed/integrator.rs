@@ -44,6 +44,31 @@ impl MixedState {
 ///
 /// Unknowns without inertia, and shared ones, are in equilibrium with the others at the end of each step; with the
 /// midpoint rule, at its middle.
+///
+/// ```
+/// use energy_elements::Gravity;
+/// use energy_solve::{
+///     Inertia, KindSolver, MixedBody, MixedIntegrator, MixedNewtonOptions, MixedScheme, MixedState, MixedSystem,
+///     MixedTerm, UnknownKind,
+/// };
+///
+/// // A rigid body of 2 kg, an orientation and a centre, falls and spins about its second axis.
+/// let body = MixedBody::new(&[UnknownKind::Rotation, UnknownKind::Vector3], 0.1);
+/// let weight = MixedTerm::of_points("weight", vec![Gravity::new(2.0, [0.0, 0.0, -9.81])], &[[1]])?;
+/// let system = MixedSystem::new(body, vec![weight])?;
+/// let tensor = [[0.01, 0.0, 0.0], [0.0, 0.02, 0.0], [0.0, 0.0, 0.03]];
+/// let inertia = vec![Inertia::Tensor(tensor), Inertia::Mass(2.0)];
+/// let (scheme, options) = (MixedScheme::ImplicitMidpoint, MixedNewtonOptions::new(1e-12));
+/// let mut integrator = MixedIntegrator::new(system, inertia, scheme, &KindSolver::Automatic, options)?;
+/// let mut state = MixedState::at_rest(integrator.system(), vec![1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 5.0]);
+/// state.rates[1] = 3.0;
+/// for _ in 0..100 {
+///     integrator.step(&mut state, 0.01)?;
+/// }
+/// assert!((state.u[6] - (5.0 - 9.81 / 2.0)).abs() < 1e-9); // after 1 s
+/// assert!((state.u[2].abs() - 1.5_f64.sin()).abs() < 1e-9); // turned by 3 rad about y
+/// # Ok::<(), energy_solve::MixedNewtonError>(())
+/// ```
 #[derive(Debug)]
 pub struct MixedIntegrator {
     system: MixedSystem,

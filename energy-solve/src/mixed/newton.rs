@@ -120,6 +120,22 @@ const ROUNDING: f64 = 1e-14;
 ///
 /// Shared unknowns that are [maximised](super::Extremum::Maximum) are eliminated: steps minimise the potential maximised
 /// over them.
+///
+/// ```
+/// use energy_elements::{Gravity, HookeSpring};
+/// use energy_solve::{KindSolver, MixedBody, MixedNewton, MixedNewtonOptions, MixedSystem, MixedTerm, UnknownKind};
+///
+/// // A point of 2 kg hangs from a fixed one by a spring of 100 N/m that is 1 m long at rest.
+/// let body = MixedBody::new(&[UnknownKind::Vector3; 2], 1.0).with_fixed(&[0])?;
+/// let spring = MixedTerm::of_points("spring", vec![HookeSpring::new(100.0, 1.0)], &[[0, 1]])?;
+/// let weight = MixedTerm::of_points("weight", vec![Gravity::new(2.0, [0.0, 0.0, -9.81])], &[[1]])?;
+/// let mut system = MixedSystem::new(body, vec![spring, weight])?;
+/// let mut newton = MixedNewton::new(&system, &KindSolver::Automatic, MixedNewtonOptions::new(1e-12));
+/// let (u, report) = newton.minimise(&mut system, &[0.0, 0.0, 0.0, 0.3, 0.0, -0.9])?;
+/// assert!(report.converged());
+/// assert!((u[5] + 1.0 + 2.0 * 9.81 / 100.0).abs() < 1e-12);
+/// # Ok::<(), energy_solve::MixedNewtonError>(())
+/// ```
 #[derive(Debug)]
 pub struct MixedNewton {
     options: MixedNewtonOptions,
