@@ -248,6 +248,28 @@ fn projected_hessians_are_semi_definite_and_leave_multipliers_alone() {
 }
 
 #[test]
+fn blocks_of_metres_and_radians_are_projected_by_their_length() {
+    for length in [0.1, 3.0] {
+        let body = MixedBody::new(&[UnknownKind::Rotation, VECTOR], length);
+        let term = MixedTerm::new("joint", vec![Joint { stiffness: 2.0, lever: 0.7 }], &[[0, 1]]).unwrap();
+        let mut system = MixedSystem::new(body, vec![term]).unwrap();
+        let u = [0.6, 0.0, 0.8, 0.0, -0.9, 0.3, -0.4];
+        let (mut exact, mut projected) = (system.matrix(), system.matrix());
+        system.linearise(&u, Curvature::Exact, &mut exact).unwrap();
+        system.linearise(&u, Curvature::Clamped, &mut projected).unwrap();
+        // Increments in m: those of the rotation times the length.
+        let scale = DVector::from_fn(6, |i, _| if i < 3 { 1.0 / length } else { 1.0 });
+        let by_metres = DMatrix::from_diagonal(&scale) * dense(&exact) * DMatrix::from_diagonal(&scale);
+        let mut eigen = by_metres.symmetric_eigen();
+        assert!(eigen.eigenvalues.min() < -0.01, "the Hessian is indefinite");
+        eigen.eigenvalues.iter_mut().for_each(|value| *value = value.max(0.0));
+        let unscale = DMatrix::from_diagonal(&scale.map(|s| 1.0 / s));
+        let expected = &unscale * eigen.recompose() * &unscale;
+        assert!((dense(&projected) - expected).amax() < 1e-12);
+    }
+}
+
+#[test]
 fn a_rod_finds_its_equilibrium() {
     for solver in [BAND, gradients()] {
         let mut system = rod(20, &[0, 1, 2]);
@@ -591,6 +613,7 @@ fn stencils_that_do_not_fit_are_errors() {
     assert_eq!(shared, "lengths: element 0 names shared unknown 1, but there are only 1");
     let spring = Spring { stiffness: 1.0, length: 1.0 };
     assert!(place(MixedTerm::of_points("springs", vec![spring], &[[0, 2]])).contains("is a rotation"));
+    assert!(place(MixedTerm::new("joint", joint(), &[[]])).contains("does not fit its 0 unknowns"));
     let uneven = MixedTerm::new("rod", rod(), &[[0, 3, 5, 1, 4]; 2]).unwrap_err();
     assert_eq!(uneven.to_string(), "rod: expected one stencil per element, got 2 stencils for 1 elements");
     assert!(body().with_fixed(&[6]).is_err() && body().with_fixed_shared(&[1]).is_err());
@@ -608,6 +631,10 @@ fn configurations_that_do_not_fit_are_errors() {
     let first = system.body().first_number(2);
     wrong[first..first + 4].iter_mut().for_each(|c| *c *= 1.001);
     assert!(matches!(system.energy(&wrong), Err(MixedError::NotUnit { unknown: 2, .. })));
+    for length in [0.0, -1.0, f64::NAN] {
+        let outcome = MixedSystem::new(MixedBody::new(&[VECTOR, SCALAR], length), Vec::new());
+        assert!(matches!(outcome, Err(MixedError::WrongScale { unknown: 1, .. })));
+    }
     let system = MixedSystem::new(MixedBody::new(&[VECTOR, UnknownKind::Rotation], 1.0), Vec::new()).unwrap();
     let options = MixedNewtonOptions::new(1e-9);
     let flat = diagonal([1.0, 1.0, 0.0]);

@@ -6,10 +6,10 @@ use std::sync::Arc;
 use energy_dsl::{Kernel, Level, Number, dispatch};
 
 use crate::linear::solve::SingularPivot;
-use crate::matrix::kinds::{KindMatrix, KindPattern};
+use crate::matrix::kinds::{BlockVisitor, KindMatrix, KindPattern};
 
-/// Entries that are processed together: one register of the widest level.
-const TOGETHER: usize = 8;
+/// Entries that are processed together. With 4, the rows of a rod are 12 long.
+const TOGETHER: usize = 4;
 
 /// The order in which unknowns are eliminated.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -58,6 +58,8 @@ pub struct BandFactor {
     stride: usize,
     /// The upper triangle by rows. After factorisation: 1/D and Lᵀ.
     rows: Vec<f64>,
+    /// Scratch: a vector in the order of elimination, and zeros.
+    ordered: Vec<f64>,
 }
 
 impl BandFactor {
@@ -77,7 +79,8 @@ impl BandFactor {
         let stride = (half_bandwidth + 1).next_multiple_of(TOGETHER);
         // The update of a row reads and writes whole registers, past the last row too.
         let rows = vec![0.0; (pattern.increments() + half_bandwidth + 1) * stride + TOGETHER];
-        Self { pattern: Arc::clone(pattern), positions, half_bandwidth, stride, rows }
+        let ordered = vec![0.0; pattern.increments() + stride];
+        Self { pattern: Arc::clone(pattern), positions, half_bandwidth, stride, rows, ordered }
     }
 
     /// Analyses a pattern whose half bandwidth is at most `widest` in the narrowest order. Returns `None` for others,
@@ -112,18 +115,18 @@ impl BandFactor {
     ///
     /// # Panics
     /// If x does not have one number per increment.
-    pub fn solve(&self, x: &mut [f64]) {
-        let count = self.pattern.increments();
+    pub fn solve(&mut self, x: &mut [f64]) {
+        let Self { pattern, positions, stride, rows, ordered, .. } = self;
+        let count = pattern.increments();
         assert_eq!(x.len(), count, "a vector has a number per increment");
-        let mut ordered = vec![0.0; count + self.stride];
-        for unknown in 0..self.pattern.unknowns() {
-            let (first, size) = (self.pattern.first(unknown), self.pattern.size(unknown));
-            ordered[self.positions[unknown]..][..size].copy_from_slice(&x[first..][..size]);
+        for unknown in 0..pattern.unknowns() {
+            let (first, size) = (pattern.first(unknown), pattern.size(unknown));
+            ordered[positions[unknown]..][..size].copy_from_slice(&x[first..][..size]);
         }
-        dispatch(Substitution { rows: &self.rows, count, stride: self.stride, x: &mut ordered });
-        for unknown in 0..self.pattern.unknowns() {
-            let (first, size) = (self.pattern.first(unknown), self.pattern.size(unknown));
-            x[first..][..size].copy_from_slice(&ordered[self.positions[unknown]..][..size]);
+        dispatch(Substitution { rows, count, stride: *stride, x: ordered });
+        for unknown in 0..pattern.unknowns() {
+            let (first, size) = (pattern.first(unknown), pattern.size(unknown));
+            x[first..][..size].copy_from_slice(&ordered[positions[unknown]..][..size]);
         }
     }
 
@@ -131,11 +134,7 @@ impl BandFactor {
     fn fill(&mut self, matrix: &KindMatrix) {
         let Self { positions, stride, rows, .. } = self;
         rows.fill(0.0);
-        matrix.for_each_entry(|(row, column), (i, j), entry| {
-            let (row, column) = (positions[row] + i, positions[column] + j);
-            // Diagonal blocks are whole: the same entry comes twice.
-            rows[row.min(column) * *stride + row.abs_diff(column)] = entry;
-        });
+        matrix.visit(&mut Fill { positions, stride: *stride, rows });
     }
 
     /// Returns the unknown that has a position.
@@ -143,6 +142,37 @@ impl BandFactor {
         let has = |&unknown: &usize| (self.positions[unknown]..self.positions[unknown] + 3).contains(&position);
         let of_size = |&unknown: &usize| position - self.positions[unknown] < self.pattern.size(unknown);
         (0..self.pattern.unknowns()).filter(has).find(of_size).expect("each position belongs to an unknown")
+    }
+}
+
+/// Copies blocks to the upper triangle of a band.
+struct Fill<'a> {
+    positions: &'a [usize],
+    stride: usize,
+    rows: &'a mut [f64],
+}
+
+impl BlockVisitor for Fill<'_> {
+    #[inline(always)]
+    fn block<const R: usize, const C: usize>(&mut self, row: usize, column: usize, block: &[[f64; C]; R]) {
+        let (from, to) = (self.positions[row], self.positions[column]);
+        let first = from.min(to) * self.stride + from.abs_diff(to);
+        // One row down and one column left in the band is the next row of the matrix.
+        let next_row = self.stride - 1;
+        if row == column {
+            for i in 0..R {
+                self.rows[first + i * self.stride..][..R - i].copy_from_slice(&block[i][i..]);
+            }
+        } else if from < to {
+            for i in 0..R {
+                self.rows[first + i * next_row..][..C].copy_from_slice(&block[i]);
+            }
+        } else {
+            for j in 0..C {
+                let band = &mut self.rows[first + j * next_row..][..R];
+                (0..R).for_each(|i| band[i] = block[i][j]);
+            }
+        }
     }
 }
 
@@ -179,18 +209,12 @@ impl Kernel for Elimination<'_> {
             negative += usize::from(pivot < 0.0);
             row[0] = inverse;
             row[1..].iter_mut().for_each(|entry| *entry *= inverse);
-            for distance in 1..=width {
+            for (distance, target) in (1..=width).zip(below.chunks_exact_mut(stride)) {
                 let factor = -row[distance];
-                let target = &mut below[(distance - 1) * stride..][..stride];
-                let source = &pivot_row[distance..];
-                let mut done = 0;
-                while done + distance <= width {
-                    let (target, source) = (&mut target[done..][..TOGETHER], &source[done..][..TOGETHER]);
-                    for entry in 0..TOGETHER {
-                        target[entry] = Number::mul_add::<L>(factor, source[entry], target[entry]);
-                    }
-                    done += TOGETHER;
-                }
+                let count = (width + 1 - distance).next_multiple_of(TOGETHER);
+                let target = target[..count].as_chunks_mut::<TOGETHER>().0;
+                let source = pivot_row[distance..][..count].as_chunks::<TOGETHER>().0;
+                target.iter_mut().zip(source).for_each(|(target, source)| add_scaled::<L>(target, factor, source));
             }
         }
         Ok(negative)
@@ -213,27 +237,36 @@ impl Kernel for Substitution<'_> {
         let Self { rows, count, stride, x } = self;
         for position in 0..count {
             let factor = -x[position];
-            let row = &rows[position * stride..][..stride];
-            let x = &mut x[position..][..stride];
-            // The first entry of a row is 1/D.
-            for entry in 1..stride {
-                x[entry] = Number::mul_add::<L>(factor, row[entry], x[entry]);
-            }
+            let row = rows[position * stride..][..stride].as_chunks::<TOGETHER>().0;
+            let own = x[position..][..stride].as_chunks_mut::<TOGETHER>().0;
+            own.iter_mut().zip(row).for_each(|(x, row)| add_scaled::<L>(x, factor, row));
+            // The first entry of a row is 1/D, and not that of L.
+            x[position] = -factor;
         }
         for position in (0..count).rev() {
             let row = &rows[position * stride..][..stride];
             let x = &mut x[position..][..stride];
             let scaled = row[0] * std::mem::take(&mut x[0]);
             let mut sums = [0.0; TOGETHER];
-            for (entries, x) in row.chunks_exact(TOGETHER).zip(x.chunks_exact(TOGETHER)) {
+            for (entries, x) in row.as_chunks::<TOGETHER>().0.iter().zip(x.as_chunks::<TOGETHER>().0) {
                 for entry in 0..TOGETHER {
                     sums[entry] = Number::mul_add::<L>(entries[entry], x[entry], sums[entry]);
                 }
             }
-            let [a, b, c, d, e, f, g, h] = sums;
-            x[0] = scaled - (((a + b) + (c + d)) + ((e + f) + (g + h)));
+            let [a, b, c, d] = sums;
+            x[0] = scaled - ((a + b) + (c + d));
         }
     }
+}
+
+/// y ← y + s x. Reads all numbers before it writes any, so that they fill a register.
+#[inline(always)]
+fn add_scaled<L: Level>(y: &mut [f64; TOGETHER], s: f64, x: &[f64; TOGETHER]) {
+    let mut sums = *y;
+    for entry in 0..TOGETHER {
+        sums[entry] = Number::mul_add::<L>(s, x[entry], sums[entry]);
+    }
+    *y = sums;
 }
 
 /// Returns the positions in the order of the unknowns or, if that has a narrower band, in reverse Cuthill–McKee order.
@@ -335,5 +368,98 @@ impl BreadthFirst {
             let last = found.iter().filter(|(_, level)| *level == deepest).map(|(unknown, _)| *unknown);
             start = last.min_by_key(|&unknown| (self.neighbours[unknown].len(), unknown)).unwrap_or(start);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{DMatrix, DVector};
+    use proptest::prelude::*;
+
+    use super::*;
+
+    /// A matrix over unknowns of several sizes, each of which is coupled to some of the next three.
+    #[derive(Debug)]
+    struct Chain {
+        matrix: KindMatrix,
+        dense: DMatrix<f64>,
+    }
+
+    impl Chain {
+        /// Unknown i has a diagonal that dominates, negative if `negative[i]`.
+        fn new(sizes: &[usize], negative: &[bool], seed: u64) -> Self {
+            let mut random = fastrand::Rng::with_seed(seed);
+            let count = sizes.len();
+            let near = |i: usize| (i + 1..(i + 4).min(count)).map(move |j| [i as u32, j as u32]);
+            let links: Vec<[u32; 2]> = (0..count).flat_map(near).filter(|_| random.bool()).collect();
+            let pattern = Arc::new(KindPattern::from_stencils(sizes, links.iter().map(<[u32; 2]>::as_slice)));
+            let mut matrix = KindMatrix::zeros(Arc::clone(&pattern));
+            let mut dense = DMatrix::zeros(pattern.increments(), pattern.increments());
+            let own = (0..count).map(|i| (i, i));
+            for (i, j) in own.chain(links.iter().map(|&[i, j]| (i as usize, j as usize))) {
+                let entries: Vec<f64> = (0..9).map(|_| random.f64() - 0.5).collect();
+                let dominant = if negative[i] { -20.0 } else { 20.0 };
+                let entry = |a: usize, b: usize| match (i == j, a == b) {
+                    (true, true) => dominant,
+                    (true, false) => entries[a.min(b) + a.max(b)],
+                    _ => entries[3 * a + b],
+                };
+                matrix.add(i, j, entry);
+                for a in 0..sizes[i] {
+                    for b in 0..sizes[j] {
+                        let (row, column) = (pattern.first(i) + a, pattern.first(j) + b);
+                        dense[(row, column)] = entry(a, b);
+                        dense[(column, row)] = entry(a, b);
+                    }
+                }
+            }
+            Self { matrix, dense }
+        }
+    }
+
+    fn close(found: &[f64], expected: &DVector<f64>) -> bool {
+        found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-12)
+    }
+
+    proptest! {
+        #[test]
+        fn products_solutions_and_signs_are_those_of_a_dense_matrix(
+            sizes in prop::collection::vec(1..=3_usize, 1..30),
+            negative in prop::collection::vec(prop::bool::weighted(0.2), 30),
+            seed in 0..1000_u64,
+        ) {
+            let Chain { matrix, dense } = Chain::new(&sizes, &negative, seed);
+            let expected = DVector::from_fn(dense.nrows(), |i, _| (i as f64 + 0.5).sin());
+            let mut product = vec![f64::NAN; dense.nrows()];
+            matrix.multiply(expected.as_slice(), &mut product);
+            prop_assert!(close(&product, &(&dense * &expected)));
+            let negative_eigenvalues = dense.symmetric_eigenvalues().iter().filter(|value| **value < 0.0).count();
+            for order in [BandOrder::AsGiven, BandOrder::ReverseCuthillMckee, BandOrder::Narrowest] {
+                let mut factor = BandFactor::new(matrix.pattern(), &order);
+                prop_assert_eq!(factor.factor(&matrix), Ok(negative_eigenvalues));
+                let mut x = product.clone();
+                factor.solve(&mut x);
+                prop_assert!(close(&x, &expected), "{:?}: {:?} instead of {}", order, x, expected);
+            }
+        }
+    }
+
+    #[test]
+    fn a_pivot_of_zero_names_its_unknown() {
+        let pattern = Arc::new(KindPattern::from_stencils(&[3, 1, 2], []));
+        let mut matrix = KindMatrix::zeros(Arc::clone(&pattern));
+        for (unknown, entry) in [(0, 1.0), (1, 2.0), (2, 0.0)] {
+            matrix.add(unknown, unknown, |i, j| if i == j { entry } else { 0.0 });
+        }
+        let outcome = BandFactor::new(&pattern, &BandOrder::AsGiven).factor(&matrix);
+        assert_eq!(outcome, Err(SingularPivot { unknown: 2 }));
+    }
+
+    #[test]
+    fn matrices_without_unknowns_have_empty_factors() {
+        let pattern = Arc::new(KindPattern::from_stencils(&[], []));
+        let mut factor = BandFactor::new(&pattern, &BandOrder::Narrowest);
+        assert_eq!(factor.factor(&KindMatrix::zeros(Arc::clone(&pattern))), Ok(0));
+        factor.solve(&mut []);
     }
 }

@@ -156,7 +156,7 @@ impl Band {
     }
 
     /// x ← K⁻¹ x.
-    fn substitute(&self, matrix: &BorderedMatrix, x: &mut [f64]) {
+    fn substitute(&mut self, matrix: &BorderedMatrix, x: &mut [f64]) {
         let n = matrix.kinds.pattern().increments();
         let (own, shared) = x.split_at_mut(n);
         self.factor.solve(own);

@@ -136,6 +136,10 @@ impl KindPattern {
     /// Returns the place of the block of two unknowns; `None` if it is not in the pattern.
     pub(crate) fn slot(&self, row: usize, column: usize) -> Option<KindSlot> {
         let (row_size, column_size) = (self.size(row), self.size(column));
+        if row == column {
+            let slot = self.square[row_size - 1].diagonal(self.numbers[row] as usize);
+            return Some(KindSlot { slot: index(slot), flipped: false });
+        }
         let (row, column) = (self.numbers[row], self.numbers[column]);
         if row_size == column_size {
             let (slot, flipped) = self.square[row_size - 1].slot(row as usize, column as usize)?;
@@ -224,6 +228,12 @@ pub struct KindMatrix {
     two_one: Vec<[[f64; 1]; 2]>,
     three_one: Vec<[[f64; 1]; 3]>,
     three_two: Vec<[[f64; 2]; 3]>,
+}
+
+/// Reads the blocks of a matrix.
+pub(crate) trait BlockVisitor {
+    /// Reads the block of two unknowns. Diagonal blocks are whole.
+    fn block<const R: usize, const C: usize>(&mut self, row: usize, column: usize, block: &[[f64; C]; R]);
 }
 
 impl KindMatrix {
@@ -323,32 +333,28 @@ impl KindMatrix {
         add_coupling(two_one, &self.two_one, (x2, x1), (y2, y1));
     }
 
-    /// Calls `visit` with the unknowns of each stored block, and with row, column and value of each of its entries.
+    /// Visits each stored block.
     #[inline(always)]
-    pub(crate) fn for_each_entry(&self, mut visit: impl FnMut((usize, usize), (usize, usize), f64)) {
+    pub(crate) fn visit(&self, visitor: &mut impl BlockVisitor) {
         let mut pairs = self.pattern.pairs.iter();
-        visit_blocks(&self.ones, &mut pairs, &mut visit);
-        visit_blocks(&self.twos, &mut pairs, &mut visit);
-        visit_blocks(self.threes.values(), &mut pairs, &mut visit);
-        visit_blocks(&self.two_one, &mut pairs, &mut visit);
-        visit_blocks(&self.three_one, &mut pairs, &mut visit);
-        visit_blocks(&self.three_two, &mut pairs, &mut visit);
+        visit_blocks(&self.ones, &mut pairs, visitor);
+        visit_blocks(&self.twos, &mut pairs, visitor);
+        visit_blocks(self.threes.values(), &mut pairs, visitor);
+        visit_blocks(&self.two_one, &mut pairs, visitor);
+        visit_blocks(&self.three_one, &mut pairs, visitor);
+        visit_blocks(&self.three_two, &mut pairs, visitor);
     }
 }
 
-/// Visits the entries of blocks whose unknowns come next in `pairs`.
+/// Visits blocks whose unknowns come next in `pairs`.
 #[inline(always)]
 fn visit_blocks<'a, const R: usize, const C: usize>(
     blocks: &[[[f64; C]; R]],
     pairs: &mut impl Iterator<Item = &'a [u32; 2]>,
-    visit: &mut impl FnMut((usize, usize), (usize, usize), f64),
+    visitor: &mut impl BlockVisitor,
 ) {
     for (block, &[row, column]) in blocks.iter().zip(pairs) {
-        for i in 0..R {
-            for j in 0..C {
-                visit((row as usize, column as usize), (i, j), block[i][j]);
-            }
-        }
+        visitor.block(row as usize, column as usize, block);
     }
 }
 

@@ -91,6 +91,11 @@ pub(super) struct Unknown {
 }
 
 impl Unknown {
+    /// Returns the scale by which moves are compared with others.
+    pub(super) fn metric(&self) -> f64 {
+        if self.scale > 0.0 { self.scale } else { 1.0 }
+    }
+
     /// Whether an equilibrium is a minimum in it.
     pub(super) fn is_minimised(&self) -> bool {
         self.extremum == Extremum::Minimum
@@ -263,6 +268,17 @@ impl MixedBody {
             }
         }
         Ok(())
+    }
+
+    /// Checks that scales are positive; those of shared unknowns may be 0.
+    pub(super) fn check_scales(&self) -> Result<(), MixedError> {
+        let fits = |(index, unknown): (usize, &Unknown)| {
+            unknown.scale.is_finite() && (unknown.scale > 0.0 || index >= self.own && unknown.scale == 0.0)
+        };
+        match self.unknowns.iter().enumerate().position(|unknown| !fits(unknown)) {
+            Some(unknown) => Err(MixedError::WrongScale { unknown, scale: self.unknowns[unknown].scale }),
+            None => Ok(()),
+        }
     }
 
     /// Checks the length of a vector, and that its numbers are finite.

@@ -23,6 +23,9 @@ pub(super) struct Configuration<'a> {
 
 /// Evaluates elements of type `E` in lanes. Ranges start at multiples of [`energy_dsl::BLOCK`].
 pub(super) trait Kernels<E>: Debug + Send + Sync + 'static {
+    /// Whether stencils index points.
+    const ON_POINTS: bool;
+
     /// Returns the count of increments of an element.
     fn increments() -> usize;
     /// Writes U.
@@ -51,6 +54,8 @@ pub(super) trait Kernels<E>: Debug + Send + Sync + 'static {
 pub(super) struct OfMixed;
 
 impl<E: PackedMixed<f64>> Kernels<E> for OfMixed {
+    const ON_POINTS: bool = false;
+
     fn increments() -> usize {
         <<E as MixedPotential<f64>>::Increments as Array<f64>>::LEN
     }
@@ -86,6 +91,8 @@ impl<E: PackedMixed<f64>> Kernels<E> for OfMixed {
 pub(super) struct OfPoints;
 
 impl<E: PackedPotential<f64>> Kernels<E> for OfPoints {
+    const ON_POINTS: bool = true;
+
     fn increments() -> usize {
         3 * <<E as Potential<f64>>::Points as Array<Vector3<f64>>>::LEN
     }

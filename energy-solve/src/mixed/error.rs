@@ -72,6 +72,14 @@ pub enum MixedError {
         /// Number of unknowns.
         count: usize,
     },
+    /// A scale is not positive. That of a shared unknown may be 0.
+    #[error("expected a scale greater than 0 for unknown {unknown}, got {scale}; shared unknowns are counted last")]
+    WrongScale {
+        /// Index of the unknown, or, counted on from the own ones, of the shared unknown.
+        unknown: usize,
+        /// The scale, in m per unit.
+        scale: f64,
+    },
     /// A vector does not have the length that the body needs.
     #[error("the body needs {expected} {what}, but {found} were given")]
     WrongLength {
@@ -82,7 +90,7 @@ pub enum MixedError {
         /// Length of the vector.
         found: usize,
     },
-    /// A length, mass or inertia that is negative or not finite, or of another kind than its unknown.
+    /// A mass or inertia that is negative or not finite, or of another kind than its unknown.
     #[error("expected {expected} for unknown {unknown}, got {found}")]
     WrongInertia {
         /// Index of the unknown.

@@ -6,9 +6,9 @@ use super::body::{MixedBody, UnknownKind};
 use super::error::MixedError;
 use super::rotation::{self, Quaternion};
 use super::scatter::Rows;
-use super::system::MixedEnergy;
+use super::system::{EnergySum, MixedEnergy};
 use crate::linear::block_jacobi::{inverse, is_positive_definite};
-use crate::matrix::BorderedMatrix;
+use crate::matrix::{BorderedMatrix, index};
 use crate::terms::Curvature;
 
 /// The inertia of an unknown.
@@ -61,14 +61,25 @@ fn is_inertia(tensor: &Block<f64>) -> bool {
 #[derive(Debug)]
 pub(super) struct InertialPotential {
     time: f64,
-    predictions: Vec<(usize, Prediction)>,
+    flat: Vec<Flat>,
+    turning: Vec<Turning>,
 }
 
-/// Where free motion leads.
+/// Where free motion leads a flat unknown.
 #[derive(Clone, Copy, Debug)]
-enum Prediction {
-    Flat { mass: f64, size: usize, at: Vector3<f64> },
-    Turned { tensor: Block<f64>, at: Quaternion },
+struct Flat {
+    unknown: u32,
+    size: u32,
+    mass: f64,
+    at: Vector3<f64>,
+}
+
+/// Where free motion leads a rotation, and the inertia tensor in space there.
+#[derive(Clone, Copy, Debug)]
+struct Turning {
+    unknown: usize,
+    tensor: Block<f64>,
+    at: Quaternion,
 }
 
 impl InertialPotential {
@@ -81,91 +92,86 @@ impl InertialPotential {
         time: f64,
         reference: f64,
     ) -> Self {
-        let mut predictions = Vec::with_capacity(inertia.len());
-        for (index, (unknown, inertia)) in body.all().iter().zip(inertia).enumerate() {
+        let (mut flat, mut turning) = (Vec::new(), Vec::new());
+        let free = body.all().iter().zip(inertia).enumerate().filter(|(_, (unknown, _))| !unknown.fixed);
+        for (number, (unknown, inertia)) in free {
             let (u, rates) = (&u[unknown.number..], &rates[unknown.increment..]);
-            let prediction = match *inertia {
-                _ if unknown.fixed => continue,
-                Inertia::None => continue,
+            match *inertia {
+                Inertia::None => {}
                 Inertia::Mass(mass) => {
                     let size = unknown.kind.increments();
                     let at = std::array::from_fn(|i| if i < size { u[i] + time * rates[i] } else { 0.0 });
-                    Prediction::Flat { mass, size, at }
+                    flat.push(Flat { unknown: index(number), size: size as u32, mass, at });
                 }
                 Inertia::Tensor(tensor) => {
                     let (q, rate) = (std::array::from_fn(|i| u[i]), std::array::from_fn(|i| rates[i]));
                     let at = free_rotation(&tensor, q, rate, time, reference);
-                    Prediction::Turned { tensor: rotation::turned(&tensor, at), at }
+                    turning.push(Turning { unknown: number, tensor: rotation::turned(&tensor, at), at });
                 }
-            };
-            predictions.push((index, prediction));
+            }
         }
-        Self { time, predictions }
+        Self { time, flat, turning }
     }
 
-    /// Adds the energy.
-    pub(super) fn add_energy(&self, body: &MixedBody, u: &[f64], sum: &mut MixedEnergy) {
-        for (unknown, prediction) in &self.predictions {
-            let own = &u[body.first_number(*unknown)..];
-            sum.add(match prediction {
-                Prediction::Flat { mass, size, at } => {
-                    let square: f64 = own[..*size].iter().zip(at).map(|(x, at)| (x - at) * (x - at)).sum();
-                    0.5 * mass * square / (self.time * self.time)
-                }
-                Prediction::Turned { tensor, at } => {
-                    let (_, v) = difference(own, *at);
-                    2.0 * dot(v, times(tensor, v)) / (self.time * self.time)
-                }
-            });
+    /// Returns the energy.
+    pub(super) fn energy(&self, body: &MixedBody, u: &[f64]) -> MixedEnergy {
+        let mut sum = EnergySum::default();
+        let squared = self.time * self.time;
+        for flat in &self.flat {
+            let moved = flat.difference(body, u);
+            sum.add(0.5 * flat.mass * dot(moved, moved) / squared);
+        }
+        for Turning { unknown, tensor, at } in &self.turning {
+            let (_, v) = difference(&u[body.first_number(*unknown)..], *at);
+            sum.add(2.0 * dot(v, times(tensor, v)) / squared);
+        }
+        sum.energy()
+    }
+
+    /// Adds the gradient.
+    pub(super) fn add_gradient(&self, body: &MixedBody, u: &[f64], gradient: &mut [f64]) {
+        let squared = self.time * self.time;
+        for flat in &self.flat {
+            let (moved, first) = (flat.difference(body, u), body.first_increment(flat.unknown as usize));
+            let own = &mut gradient[first..][..flat.size as usize];
+            own.iter_mut().zip(moved).for_each(|(sum, moved)| *sum += flat.mass * moved / squared);
+        }
+        for Turning { unknown, tensor, at } in &self.turning {
+            let (w, v) = difference(&u[body.first_number(*unknown)..], *at);
+            let (g, product) = (derivative(w, v), times(tensor, v));
+            let own = &mut gradient[body.first_increment(*unknown)..][..3];
+            for (i, sum) in own.iter_mut().enumerate() {
+                *sum += 4.0 * (0..3).map(|k| g[k][i] * product[k]).sum::<f64>() / squared;
+            }
         }
     }
 
-    /// Adds energy and gradient, and the Hessian to `matrix`. A `curvature` other than exact leaves out the only term that
-    /// may be negative, −¼ (vᵀ J v) 1.
-    pub(super) fn add(
+    /// Adds the Hessian. A `curvature` other than exact leaves out the only term that may be negative, −¼ (vᵀ J v) 1.
+    pub(super) fn add_hessian(
         &self,
         body: &MixedBody,
         u: &[f64],
-        (sum, gradient): (&mut MixedEnergy, &mut [f64]),
-        into: Option<(&Rows, &mut BorderedMatrix, Curvature)>,
+        curvature: Curvature,
+        rows: &Rows,
+        matrix: &mut BorderedMatrix,
     ) {
-        self.add_energy(body, u, sum);
         let squared = self.time * self.time;
-        let mut into = into;
-        for (unknown, prediction) in &self.predictions {
-            let own = &u[body.first_number(*unknown)..];
-            let to = &mut gradient[body.first_increment(*unknown)..];
-            let mut hessian = [[0.0; 3]; 3];
-            match prediction {
-                Prediction::Flat { mass, size, at } => {
-                    for i in 0..*size {
-                        to[i] += mass * (own[i] - at[i]) / squared;
-                        hessian[i][i] = mass / squared;
-                    }
-                }
-                Prediction::Turned { tensor, at } => {
-                    let (w, v) = difference(own, *at);
-                    let product = times(tensor, v);
-                    let g = derivative(w, v);
-                    let along = if into.as_ref().is_some_and(|(.., curvature)| *curvature == Curvature::Exact) {
-                        0.25 * dot(v, product)
-                    } else {
-                        0.0
-                    };
-                    for i in 0..3 {
-                        to[i] += 4.0 * (0..3).map(|k| g[k][i] * product[k]).sum::<f64>() / squared;
-                        for j in 0..3 {
-                            let column = times(tensor, [g[0][j], g[1][j], g[2][j]]);
-                            let square: f64 = (0..3).map(|k| g[k][i] * column[k]).sum();
-                            hessian[i][j] = 4.0 * (square - if i == j { along } else { 0.0 }) / squared;
-                        }
-                    }
-                }
-            }
-            if let Some((rows, matrix, _)) = &mut into {
-                let row = rows.of[*unknown].expect("a fixed unknown has no prediction") as usize;
-                matrix.kinds.add(row, row, |i, j| hessian[i.min(j)][i.max(j)]);
-            }
+        let row = |unknown: usize| rows.of[unknown].expect("a fixed unknown has no prediction") as usize;
+        for flat in &self.flat {
+            let (row, entry) = (row(flat.unknown as usize), flat.mass / squared);
+            matrix.kinds.add(row, row, |i, j| if i == j { entry } else { 0.0 });
+        }
+        for Turning { unknown, tensor, at } in &self.turning {
+            let (w, v) = difference(&u[body.first_number(*unknown)..], *at);
+            let g = derivative(w, v);
+            let along = if curvature == Curvature::Exact { 0.25 * dot(v, times(tensor, v)) } else { 0.0 };
+            let column = |j: usize| [g[0][j], g[1][j], g[2][j]];
+            let entry = |i: usize, j: usize| {
+                // Symmetric bit by bit.
+                let square = dot(column(i.min(j)), times(tensor, column(i.max(j))));
+                4.0 * (square - if i == j { along } else { 0.0 }) / squared
+            };
+            matrix.kinds.add(row(*unknown), row(*unknown), entry);
         }
     }
 
@@ -181,25 +187,33 @@ impl InertialPotential {
     ) -> Vec<f64> {
         let mut after = mean_rates(body, before, end, time);
         let mut impulse = vec![0.0; body.increments()];
-        self.add(body, minimum, (&mut MixedEnergy::default(), &mut impulse), None);
+        self.add_gradient(body, minimum, &mut impulse);
         impulse.iter_mut().for_each(|entry| *entry *= time);
-        for (unknown, prediction) in &self.predictions {
-            let (number, first) = (body.first_number(*unknown), body.first_increment(*unknown));
-            match (prediction, inertia[*unknown]) {
-                (Prediction::Flat { mass, size, .. }, _) if *mass > 0.0 => {
-                    (first..first + size).for_each(|i| after[i] = rates[i] + impulse[i] / mass);
-                }
-                (Prediction::Turned { .. }, Inertia::Tensor(tensor)) => {
-                    let q = |u: &[f64]| std::array::from_fn(|i| u[number + i]);
-                    let momentum =
-                        times(&rotation::turned(&tensor, q(before)), std::array::from_fn(|i| rates[first + i]));
-                    let momentum = std::array::from_fn(|i| momentum[i] + impulse[first + i]);
-                    after[first..first + 3].copy_from_slice(&angular_velocity(&tensor, q(end), momentum));
-                }
-                _ => {}
+        for flat in self.flat.iter().filter(|flat| flat.mass > 0.0) {
+            let first = body.first_increment(flat.unknown as usize);
+            (first..first + flat.size as usize).for_each(|i| after[i] = rates[i] + impulse[i] / flat.mass);
+        }
+        for &Turning { unknown, .. } in &self.turning {
+            let (number, first) = (body.first_number(unknown), body.first_increment(unknown));
+            if let Inertia::Tensor(tensor) = inertia[unknown] {
+                let q = |u: &[f64]| std::array::from_fn(|i| u[number + i]);
+                let rate = std::array::from_fn(|i| rates[first + i]);
+                let momentum = times(&rotation::turned(&tensor, q(before)), rate);
+                let momentum = std::array::from_fn(|i| momentum[i] + impulse[first + i]);
+                after[first..first + 3].copy_from_slice(&angular_velocity(&tensor, q(end), momentum));
             }
         }
         after
+    }
+}
+
+impl Flat {
+    /// Returns x − x̃, padded with zeros.
+    fn difference(&self, body: &MixedBody, u: &[f64]) -> Vector3<f64> {
+        let own = &u[body.first_number(self.unknown as usize)..][..self.size as usize];
+        let mut difference = [0.0; 3];
+        difference.iter_mut().zip(own).zip(self.at).for_each(|((difference, x), at)| *difference = x - at);
+        difference
     }
 }
 

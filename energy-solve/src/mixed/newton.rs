@@ -350,5 +350,5 @@ impl MixedNewton {
 fn scales(system: &MixedSystem) -> impl Iterator<Item = (usize, f64)> {
     let own = system.body().all().iter().take(system.body().len());
     let free = own.filter(|unknown| !unknown.fixed);
-    free.map(|unknown| if unknown.scale > 0.0 { unknown.scale } else { 1.0 }).enumerate()
+    free.map(|unknown| unknown.scale).enumerate()
 }

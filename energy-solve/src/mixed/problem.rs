@@ -21,7 +21,7 @@ impl Problem<'_> {
     pub(super) fn energy(&mut self, u: &[f64]) -> Result<MixedEnergy, MixedError> {
         let mut energy = self.system.energy(u)?;
         if let Some(inertial) = self.inertial {
-            inertial.add_energy(self.system.body(), u, &mut energy);
+            energy += inertial.energy(self.system.body(), u);
         }
         Ok(energy)
     }
@@ -35,8 +35,10 @@ impl Problem<'_> {
     ) -> Result<(MixedEnergy, Vec<f64>), MixedError> {
         let (mut energy, mut gradient) = self.system.linearise(u, curvature, matrix)?;
         if let Some(inertial) = self.inertial {
-            let into = Some((self.system.rows(), matrix, curvature));
-            inertial.add(self.system.body(), u, (&mut energy, &mut gradient), into);
+            let (body, rows) = (self.system.body(), self.system.rows());
+            energy += inertial.energy(body, u);
+            inertial.add_gradient(body, u, &mut gradient);
+            inertial.add_hessian(body, u, curvature, rows, matrix);
         }
         Ok((energy, gradient))
     }

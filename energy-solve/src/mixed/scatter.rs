@@ -194,8 +194,7 @@ impl Projection {
             let unknown = &body.all()[unknown as usize];
             if unknown.is_minimised() {
                 rows.extend(from..from + size);
-                let scale = if unknown.scale > 0.0 { unknown.scale } else { 1.0 };
-                weights.extend((0..size).map(|_| 1.0 / scale));
+                weights.extend((0..size).map(|_| 1.0 / unknown.metric()));
             }
         }
         Self { rows, weights, upper: Vec::new() }

@@ -1,9 +1,9 @@
 //! Sums of terms over the unknowns of a body.
 
-use std::ops::Range;
+use std::ops::{AddAssign, Range};
 use std::sync::Arc;
 
-use energy_dsl::{BLOCK, Vector3};
+use energy_dsl::{BLOCK, Number, Vector3};
 
 use super::body::{Extremum, MixedBody, UnknownKind};
 use super::elements::Configuration;
@@ -27,10 +27,33 @@ pub struct MixedEnergy {
     pub magnitude: f64,
 }
 
-impl MixedEnergy {
+impl AddAssign for MixedEnergy {
+    fn add_assign(&mut self, other: Self) {
+        self.value += other.value;
+        self.magnitude += other.magnitude;
+    }
+}
+
+/// A running sum of energies, compensated (Neumaier 1974): bodies of many elements would lose digits that line searches
+/// need.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct EnergySum {
+    sum: f64,
+    /// The rounding errors of the sum.
+    errors: f64,
+    magnitude: f64,
+}
+
+impl EnergySum {
     pub(super) fn add(&mut self, energy: f64) {
-        self.value += energy;
+        self.errors += self.sum.sum_error(energy);
+        self.sum += energy;
         self.magnitude += energy.abs();
+    }
+
+    pub(super) fn energy(self) -> MixedEnergy {
+        let value = if self.sum.is_finite() { self.sum + self.errors } else { self.sum };
+        MixedEnergy { value, magnitude: self.magnitude }
     }
 }
 
@@ -61,8 +84,9 @@ impl MixedSystem {
     ///
     /// # Errors
     /// If a stencil has too few or too many unknowns, names one twice, one that does not exist, or one of another kind
-    /// than the element declares.
+    /// than the element declares; or if a scale of the body is not positive.
     pub fn new(body: MixedBody, terms: Vec<MixedTerm>) -> Result<Self, MixedError> {
+        body.check_scales()?;
         let placed = terms.into_iter().map(|term| term.place(&body)).collect::<Result<Vec<_>, _>>()?;
         let rows = rows(&body, &placed);
         let summed = placed.into_iter().map(|term| {
@@ -70,7 +94,7 @@ impl MixedSystem {
             Summed { scatter, term, counts: Counts::default() }
         });
         let terms: Vec<Summed> = summed.collect();
-        let with_points = terms.iter().any(|summed| !summed.term.declaration.is_mixed());
+        let with_points = terms.iter().any(|summed| summed.term.on_points);
         let increments = increments(&body, &rows);
         Ok(Self { body, terms, rows, increments, with_points })
     }
@@ -125,7 +149,7 @@ impl MixedSystem {
         self.body.check(u)?;
         let points = self.points(u);
         let at = Configuration { u, points: &points };
-        let mut sum = MixedEnergy::default();
+        let mut sum = EnergySum::default();
         let mut energies = [0.0; CHUNK];
         for Summed { term, counts, .. } in &mut self.terms {
             let mut flagged = 0;
@@ -136,7 +160,7 @@ impl MixedSystem {
             }
             counts.value += tally(term, flagged);
         }
-        Ok(sum)
+        Ok(sum.energy())
     }
 
     /// Returns U and ∂U/∂u, one number per increment of the body: in N for points, in N m for angles and rotations. The
@@ -148,7 +172,7 @@ impl MixedSystem {
         self.body.check(u)?;
         let points = self.points(u);
         let at = Configuration { u, points: &points };
-        let mut sum = MixedEnergy::default();
+        let mut sum = EnergySum::default();
         let mut gradient = vec![0.0; self.body.increments()];
         let mut energies = [0.0; CHUNK];
         for Summed { term, scatter, counts } in &mut self.terms {
@@ -165,7 +189,7 @@ impl MixedSystem {
             }
             counts.gradient += tally(term, flagged);
         }
-        Ok((sum, gradient))
+        Ok((sum.energy(), gradient))
     }
 
     /// Writes ∂²U/∂u² over the free unknowns to `matrix` and returns U and ∂U/∂u, as [`MixedSystem::gradient`] does.
@@ -219,7 +243,7 @@ impl MixedSystem {
     ) -> Result<(MixedEnergy, Vec<f64>), MixedError> {
         let points = self.points(u);
         let at = Configuration { u, points: &points };
-        let mut sum = MixedEnergy::default();
+        let mut sum = EnergySum::default();
         let mut gradient = vec![0.0; self.body.increments()];
         let mut energies = [0.0; CHUNK];
         for Summed { term, scatter, counts } in self.terms.iter_mut().filter(|summed| wanted(&summed.scatter)) {
@@ -241,7 +265,7 @@ impl MixedSystem {
             }
             counts.hessian += Tally { projected, ..tally(term, flagged) };
         }
-        Ok((sum, gradient))
+        Ok((sum.energy(), gradient))
     }
 
     /// Replaces the state of each element by the one after a step that ends at u. Call it once after each accepted step.

@@ -22,7 +22,7 @@ pub struct MixedTerm {
     elements: Box<dyn Unplaced>,
     /// Increments of an element.
     increments: usize,
-    /// Whether each declared unknown is a point, which takes one unknown.
+    /// Whether the elements are evaluated at points: then each declared unknown takes one vector of 3.
     on_points: bool,
     /// Indices in declared order, `arity` for each element.
     stencils: Vec<usize>,
@@ -112,7 +112,7 @@ impl MixedTerm {
             count: elements.len(),
             elements: Box::new(Listed { elements, routines, kernels: PhantomData::<K> }),
             increments: K::increments(),
-            on_points: !E::DECLARATION.is_mixed(),
+            on_points: K::ON_POINTS,
             stencils: stencils.as_flattened().to_vec(),
             arity: N,
         })
@@ -131,7 +131,8 @@ impl MixedTerm {
     pub(super) fn place(self, body: &MixedBody) -> Result<Placed, MixedError> {
         let mut unknowns = Vec::with_capacity(self.stencils.len());
         let mut kinds: Vec<UnknownKind> = Vec::new();
-        for (element, stencil) in self.stencils.chunks_exact(self.arity.max(1)).enumerate() {
+        for element in 0..self.count {
+            let stencil = &self.stencils[element * self.arity..][..self.arity];
             let first = unknowns.len();
             self.resolve(element, stencil, body, &mut unknowns)?;
             let own = unknowns[first..].iter().map(|&unknown| body.all()[unknown as usize].kind);
@@ -153,7 +154,7 @@ impl MixedTerm {
         let elements = self.elements.place(&active, points.as_ref().unwrap_or(&numbers), numbers.clone());
         Ok(Placed {
             name: self.name,
-            declaration: self.declaration,
+            on_points: self.on_points,
             elements,
             increments: self.increments,
             kinds,
@@ -248,7 +249,8 @@ fn points_of(body: &MixedBody, unknowns: &[u32]) -> Vec<u32> {
 #[derive(Debug)]
 pub(super) struct Placed {
     pub(super) name: String,
-    pub(super) declaration: &'static Declaration,
+    /// Whether the elements are evaluated at points.
+    pub(super) on_points: bool,
     pub(super) elements: Box<dyn Elements>,
     /// Increments of an element.
     pub(super) increments: usize,
