@@ -3,6 +3,8 @@
 use energy_dsl::{Declaration, Flags, Inputs, Kind, Outputs, RestError};
 use serde::Serialize;
 
+use crate::sample::state_size;
+
 /// A function that evaluates a generated element of any type.
 pub type Evaluate = fn(&Inputs<'_, f64>) -> Result<Outputs<f64>, RestError>;
 
@@ -36,6 +38,18 @@ pub enum BlockName {
     /// ∂C/∂x or ∂r/∂u.
     #[serde(rename = "jacobian")]
     Jacobian,
+    /// The state after a step.
+    #[serde(rename = "next")]
+    Next,
+    /// Its derivative by the unknowns.
+    #[serde(rename = "next_by_unknowns")]
+    NextByUnknowns,
+    /// Its derivative by the state before.
+    #[serde(rename = "next_by_state")]
+    NextByState,
+    /// ∂²U/∂x∂(state), or ∂r/∂(state).
+    #[serde(rename = "slopes_by_state")]
+    SlopesByState,
 }
 
 impl BlockName {
@@ -52,6 +66,10 @@ impl BlockName {
             Self::Constraint => "constraint",
             Self::Residual => "residual",
             Self::Jacobian => "jacobian",
+            Self::Next => "next",
+            Self::NextByUnknowns => "next_by_unknowns",
+            Self::NextByState => "next_by_state",
+            Self::SlopesByState => "slopes_by_state",
         }
     }
 
@@ -70,13 +88,27 @@ impl BlockName {
         }
     }
 
+    /// Returns the blocks of a declaration: those of its kind, and those of its state.
+    #[must_use]
+    pub fn of(declaration: &Declaration) -> Vec<Self> {
+        let mut names = Self::of_kind(declaration.kind).to_vec();
+        if !declaration.state.is_empty() {
+            names.extend([Self::Next, Self::NextByUnknowns, Self::NextByState]);
+            if declaration.kind != Kind::Force {
+                names.push(Self::SlopesByState);
+            }
+        }
+        names
+    }
+
     /// Returns the order of differentiation of the element's formula that yields this block, which is its index in
     /// [`Outputs::flags`].
     #[must_use]
     pub fn order(self, kind: Kind) -> usize {
         match self {
-            Self::Energy | Self::Constraint | Self::Residual => 0,
-            Self::Gradient | Self::Jacobian => 1,
+            Self::Energy | Self::Constraint | Self::Residual | Self::Next => 0,
+            Self::Gradient | Self::Jacobian | Self::NextByUnknowns | Self::NextByState => 1,
+            Self::SlopesByState => 1 + usize::from(kind != Kind::Residual),
             Self::Hessian => 2,
             // The force of a constraint contains its Jacobian.
             Self::Force => usize::from(kind == Kind::Constraint),
@@ -133,7 +165,7 @@ pub fn largest(numbers: &[f64]) -> f64 {
 /// The complete blocks of an element at one input.
 #[derive(Clone, Debug)]
 pub struct Answer {
-    /// Blocks in the order of [`BlockName::of_kind`].
+    /// Blocks in the order of [`BlockName::of`].
     pub blocks: Vec<Block>,
     /// Blocks that further routines return as well, with the name of the routine.
     pub repeats: Vec<(&'static str, Block)>,
@@ -195,7 +227,7 @@ pub fn evaluate(
     let mut outputs = evaluate(inputs)?;
     let element = || declaration.name.to_string();
     let mut blocks = Vec::new();
-    for &name in BlockName::of_kind(declaration.kind) {
+    for name in BlockName::of(declaration) {
         let (rows, columns) = shape(declaration, name);
         let at = outputs.blocks.iter().position(|(found, _)| *found == name.name());
         let numbers = match at {
@@ -226,12 +258,17 @@ pub fn evaluate(
 
 /// Returns the number of rows and columns of a block; vectors have one row.
 fn shape(declaration: &Declaration, name: BlockName) -> (usize, usize) {
-    let n: usize = declaration.points.iter().map(|point| point.size).sum();
+    let (n, states) = (declaration.increments(), state_size(declaration));
     match name {
         BlockName::Energy => (1, 1),
         BlockName::Gradient | BlockName::Force => (1, n),
         BlockName::Hessian | BlockName::ForceByPosition | BlockName::ForceByVelocity => (n, n),
         BlockName::Constraint | BlockName::Residual => (1, declaration.rows),
         BlockName::Jacobian => (declaration.rows, n),
+        BlockName::Next => (1, states),
+        BlockName::NextByUnknowns => (states, n),
+        BlockName::NextByState => (states, states),
+        BlockName::SlopesByState if declaration.kind == Kind::Residual => (declaration.rows, states),
+        BlockName::SlopesByState => (n, states),
     }
 }

@@ -4,16 +4,18 @@
 //! derivative from a wrong one. A difference across a kink or the boundary of two regions is the derivative of neither
 //! side, so only steps whose inputs all lie on one side count.
 
-use energy_dsl::Kind;
+use energy_dsl::{Declaration, Kind};
 
 use crate::blocks::{BlockName, NoAnswer, largest};
-use crate::sample::Sample;
+use crate::chart;
+use crate::sample::{Sample, state_size};
 
 /// The inputs that are stepped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Stepped {
     Positions,
     Velocities,
+    State,
 }
 
 /// Returns the block one order below, whose differences must equal `block`, and the inputs to step.
@@ -25,7 +27,11 @@ pub(crate) fn antiderivative(block: BlockName, kind: Kind) -> Option<(BlockName,
         BlockName::Hessian => Some((BlockName::Gradient, Stepped::Positions)),
         BlockName::ForceByPosition => Some((BlockName::Force, Stepped::Positions)),
         BlockName::ForceByVelocity => Some((BlockName::Force, Stepped::Velocities)),
-        BlockName::Energy | BlockName::Force | BlockName::Constraint | BlockName::Residual => None,
+        BlockName::NextByUnknowns => Some((BlockName::Next, Stepped::Positions)),
+        BlockName::NextByState => Some((BlockName::Next, Stepped::State)),
+        BlockName::SlopesByState if kind == Kind::Residual => Some((BlockName::Residual, Stepped::State)),
+        BlockName::SlopesByState => Some((BlockName::Gradient, Stepped::State)),
+        BlockName::Energy | BlockName::Force | BlockName::Constraint | BlockName::Residual | BlockName::Next => None,
     }
 }
 
@@ -46,10 +52,11 @@ pub(crate) struct Sweep {
 /// Compares differences of `lower`, a function of the stepped inputs, with `block`. `None` if hardly any step keeps all
 /// its inputs on the side of the sample, by `is_on_this_side`.
 pub(crate) fn sweep(
+    declaration: &Declaration,
     sample: &Sample,
     stepped: Stepped,
     length: f64,
-    block: &[f64],
+    (name, block): (BlockName, &[f64]),
     lower: impl Fn(&Sample) -> Result<Vec<f64>, NoAnswer>,
     is_on_this_side: impl Fn(&Sample) -> bool,
 ) -> Result<Option<Sweep>, NoAnswer> {
@@ -58,14 +65,22 @@ pub(crate) fn sweep(
     const FINER: [i32; 3] = [-17, -20, -23];
     const SUSPICIOUS: f64 = 1e-7;
     let inputs = match stepped {
-        Stepped::Positions => sample.positions.len(),
+        Stepped::Positions => declaration.increments(),
         Stepped::Velocities => sample.velocities.len(),
+        Stepped::State => state_size(declaration),
     };
     let moved = |input: usize, offset: f64| {
         let mut moved = sample.clone();
-        let list = if stepped == Stepped::Positions { &mut moved.positions } else { &mut moved.velocities };
-        list[input] += offset;
-        (list[input], moved)
+        let place = match stepped {
+            Stepped::Positions => {
+                return (chart::step(declaration, &mut moved.positions, input, offset), moved);
+            }
+            Stepped::Velocities => &mut moved.velocities[input],
+            Stepped::State => &mut moved.parameters[sample.parameters.len() - inputs + input],
+        };
+        let before = *place;
+        *place += offset;
+        (*place - before, moved)
     };
     let stays = |step: f64| (0..inputs).all(|i| [step, -step].iter().all(|&s| is_on_this_side(&moved(i, s).1)));
     let central = |step: f64| -> Result<Vec<f64>, NoAnswer> {
@@ -80,6 +95,9 @@ pub(crate) fn sweep(
             for row in 0..rows {
                 differences[row * inputs + input] = (plus[row] - minus[row]) / (high - low);
             }
+        }
+        if name == BlockName::Hessian {
+            chart::symmetrise(declaration, &mut differences);
         }
         Ok(differences)
     };

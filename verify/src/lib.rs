@@ -19,6 +19,7 @@
 
 pub mod audit;
 pub mod blocks;
+mod chart;
 mod eigenvalues;
 mod finite_difference;
 pub mod formula;

@@ -3,17 +3,18 @@
 use std::fmt;
 
 use energy_compiler::AuditScope;
-use energy_dsl::{Declaration, Field, Inputs, Kind};
+use energy_dsl::{Declaration, Field, FieldKind, Inputs, Kind};
 use fastrand::Rng;
 use serde::{Deserialize, Serialize};
 
+use crate::chart;
 use crate::geometry::{Rotation, difference, is_well_shaped, rotate, shortest_distance};
 
 /// One input of an element, flattened in declared order.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Sample {
-    /// Parameters, followed by a constraint's stiffness and damping.
+    /// Parameters, followed by a constraint's stiffness and damping, and by the state.
     #[serde(default)]
     pub parameters: Vec<f64>,
     /// Rest shape.
@@ -55,14 +56,14 @@ impl Sample {
             bad.map_or(Ok(()), |at| Err(format!("`{what}`[{at}] is not finite")))
         };
         check("positions", &self.positions, moving)?;
-        check("velocities", &self.velocities, if velocities { moving } else { 0 })?;
+        check("velocities", &self.velocities, if velocities { declaration.increments() } else { 0 })?;
         check("rest", &self.rest, size(&declaration.rest))?;
-        check("parameters", &self.parameters, size(&declaration.parameters) + implied)
+        check("parameters", &self.parameters, size(&declaration.parameters) + implied + size(&declaration.state))
     }
 
-    /// Returns k_s and k_d, the last two parameters of a constraint.
-    pub fn stiffness_and_damping(&self) -> (f64, f64) {
-        match self.parameters[..] {
+    /// Returns k_s and k_d, the last two parameters of a constraint before its state.
+    pub fn stiffness_and_damping(&self, declaration: &Declaration) -> (f64, f64) {
+        match self.parameters[..self.parameters.len() - state_size(declaration)] {
             [.., stiffness, damping] => (stiffness, damping),
             _ => (1.0, 0.0),
         }
@@ -91,9 +92,11 @@ impl Sample {
         if declaration.kind == Kind::Constraint {
             parameters.extend([("(stiffness k_s)".to_owned(), 1), ("(damping k_d)".to_owned(), 1)]);
         }
+        parameters.extend(named(&declaration.state).into_iter().map(|(name, size)| (format!("(state) {name}"), size)));
         add("", &named(&declaration.points), &self.positions);
         if !self.velocities.is_empty() {
-            add("velocity of ", &named(&declaration.points), &self.velocities);
+            let rates = declaration.points.iter().map(|field| (field.name.to_string(), field.increments()));
+            add("velocity of ", &rates.collect::<Vec<_>>(), &self.velocities);
         }
         add("rest ", &named(&declaration.rest), &self.rest);
         add("parameter ", &parameters, &self.parameters);
@@ -116,9 +119,15 @@ impl fmt::Display for Numbers<'_> {
     }
 }
 
+/// Returns the count of numbers of the state.
+pub(crate) fn state_size(declaration: &Declaration) -> usize {
+    declaration.state.iter().map(|field| field.size).sum()
+}
+
 /// Whether the positions are points in space, rather than other unknowns.
 pub fn has_points(declaration: &Declaration) -> bool {
-    !declaration.points.is_empty() && declaration.points.iter().all(|point| point.size == 3)
+    let is_point = |field: &Field| field.kind == FieldKind::Point && field.size == 3;
+    !declaration.points.is_empty() && declaration.points.iter().all(is_point)
 }
 
 /// Whether the rest shape consists of points in the plane or in space.
@@ -190,9 +199,18 @@ impl<'a> Sampler<'a> {
             parameters.extend(self.uniforms(2, 0.5, 2.0));
         }
         if matches!(declaration.kind, Kind::Constraint | Kind::Force) {
-            velocities = self.uniforms(count, -1.0, 1.0);
+            velocities = self.uniforms(declaration.increments(), -1.0, 1.0);
         }
-        Sample { parameters, rest, positions, velocities }
+        for state in &*declaration.state {
+            parameters.extend(self.parameter(state));
+        }
+        self.turned(Sample { parameters, rest, positions, velocities })
+    }
+
+    /// Scales rotations to unit length.
+    fn turned(&self, mut sample: Sample) -> Sample {
+        chart::normalise(self.declaration, &mut sample.positions);
+        sample
     }
 
     /// Draws an input whose points are the rest shape, deformed by principal stretches in a range; `None` unless the
@@ -210,7 +228,7 @@ impl<'a> Sampler<'a> {
     /// Draws an input whose positions or unknowns are a part of ordinary ones.
     pub fn scaled_sample(&mut self, factor: f64) -> Sample {
         let sample = self.sample();
-        Sample { positions: sample.positions.iter().map(|x| factor * x).collect(), ..sample }
+        self.turned(Sample { positions: sample.positions.iter().map(|x| factor * x).collect(), ..sample })
     }
 
     /// Draws unknowns of one size, from ¼ to 4.
@@ -257,7 +275,7 @@ impl<'a> Sampler<'a> {
         if self.random.bool() {
             shrink(&mut sample.positions, &mut self.random);
         }
-        sample
+        self.turned(sample)
     }
 
     /// Returns the stated range of a name.

@@ -6,7 +6,7 @@ use crate::diagnostic::{Diagnostic, Diagnostics};
 use crate::graph::{Graph, Input, NodeId, Op};
 use crate::routines::Routines;
 use crate::syntax::ElementType;
-use energy_runtime::{Kind, Property};
+use energy_runtime::{FieldKind, Kind, Property};
 
 /// Reports claims that are wrong, or that nothing would check: all but translation invariance need an audit.
 pub fn prove(program: &Program, routines: &Routines, audited: bool, diagnostics: &mut Diagnostics) {
@@ -41,7 +41,7 @@ fn translation(program: &Program, routines: &Routines) -> Option<(String, &'stat
         return None;
     }
     let values = routines.list.first().and_then(|r| r.groups.first()).cloned().unwrap_or_default();
-    let by_itself = used_by_itself(&routines.graph, &values);
+    let by_itself = used_by_itself(program, &routines.graph, &values);
     let name = by_itself.and_then(|point| program.moving.get(point)).map_or("a point", |input| input.name.as_str());
     let message =
         format!("translation invariance cannot be proved: `{name}` is used on its own, not in a difference of points");
@@ -49,9 +49,14 @@ fn translation(program: &Program, routines: &Routines) -> Option<(String, &'stat
 }
 
 /// Returns the first point that is used outside of a difference of two points.
-fn used_by_itself(graph: &Graph, outputs: &[NodeId]) -> Option<usize> {
+fn used_by_itself(program: &Program, graph: &Graph, outputs: &[NodeId]) -> Option<usize> {
     let coordinate = |node: NodeId| match graph.op(node) {
-        Op::Input(Input::Position(c)) => Some((usize::from(c) / 3, usize::from(c) % 3)),
+        Op::Input(Input::Position(c)) => {
+            let point = program.moving.partition_point(|input| input.first <= usize::from(c)) - 1;
+            let input = &program.moving[point];
+            let is_point = input.input_type.element.field_kind() == FieldKind::Point;
+            is_point.then(|| (point, usize::from(c) - input.first))
+        }
         _ => None,
     };
     let mut seen = std::collections::BTreeSet::new();

@@ -1,7 +1,10 @@
 //! Evaluation of all blocks on flattened inputs, for tools that treat all elements in the same way.
 
 use crate::array::Array;
-use crate::element::{Block, Constraint, ForceLaw, Inputs, Outputs, Potential, Residual, Vector3, triangle_index};
+use crate::element::{
+    Block, Constraint, ForceLaw, Inputs, MixedConstraint, MixedForce, MixedPotential, Outputs, Potential, Residual,
+    StateSensitivity, Stateful, Vector3, triangle_index,
+};
 use crate::numbers::Flags;
 use crate::numbers::Real;
 
@@ -96,6 +99,94 @@ pub fn evaluate_residual<T: Real, E: Residual<T>>(element: &E, inputs: &Inputs<'
         repeats: vec![("jacobian", "residual", jacobian.value.as_ref().to_vec())],
         flags: [residual.flags, jacobian.flags, Flags::clear()],
     }
+}
+
+fn unknowns<T: Real, U: Array<T>>(numbers: &[T]) -> U {
+    U::from_fn(|i| numbers.get(i).copied().unwrap_or_else(|| T::from_f64(0.0)))
+}
+
+/// Expands an upper triangle to a full matrix, row by row.
+fn full_upper<T: Real>(increments: usize, upper: &[T]) -> Vec<T> {
+    let entries = (0..increments).flat_map(|row| (0..increments).map(move |column| (row, column)));
+    entries.map(|(row, column)| upper[triangle_index(increments, row.min(column), row.max(column))]).collect()
+}
+
+/// Evaluates the blocks `energy`, `grad` and `hess` of mixed unknowns.
+#[doc(hidden)]
+pub fn evaluate_mixed_potential<T: Real, E: MixedPotential<T>>(element: &E, inputs: &Inputs<'_, T>) -> Outputs<T> {
+    let u: E::Unknowns = unknowns(inputs.positions);
+    let (value, gradient, hessian) = (element.value(&u), element.gradient(&u), element.hessian(&u));
+    Outputs {
+        blocks: vec![
+            ("energy", vec![value.value]),
+            ("grad", gradient.gradient.as_ref().to_vec()),
+            ("hess", full_upper(E::Increments::LEN, hessian.hessian.as_ref())),
+        ],
+        repeats: vec![
+            ("gradient", "energy", vec![gradient.value]),
+            ("hessian", "energy", vec![hessian.value]),
+            ("hessian", "grad", hessian.gradient.as_ref().to_vec()),
+        ],
+        flags: [value.flags, gradient.flags, hessian.flags],
+    }
+}
+
+/// Evaluates the blocks `force`, `dfdx` and `dfdv` of mixed unknowns.
+#[doc(hidden)]
+pub fn evaluate_mixed_force<T: Real, E: MixedForce<T>>(element: &E, inputs: &Inputs<'_, T>) -> Outputs<T> {
+    let (u, v): (E::Unknowns, E::Increments) = (unknowns(inputs.positions), unknowns(inputs.velocities));
+    let (force, jacobians) = (element.force(&u, &v), element.jacobians(&u, &v));
+    Outputs {
+        blocks: vec![
+            ("force", force.force.as_ref().to_vec()),
+            ("dfdx", jacobians.by_position.as_ref().to_vec()),
+            ("dfdv", jacobians.by_velocity.as_ref().to_vec()),
+        ],
+        repeats: vec![("jacobians", "force", jacobians.force.as_ref().to_vec())],
+        flags: [force.flags, jacobians.flags, jacobians.flags],
+    }
+}
+
+/// Evaluates the blocks of the potential and the force, `constraint` and `jacobian`, of mixed unknowns.
+#[doc(hidden)]
+pub fn evaluate_mixed_constraint<T: Real, E: MixedConstraint<T>>(element: &E, inputs: &Inputs<'_, T>) -> Outputs<T> {
+    let mut outputs = evaluate_mixed_potential(element, inputs);
+    let force = evaluate_mixed_force(element, inputs);
+    let jacobian = element.constraint_jacobian(&unknowns(inputs.positions));
+    outputs.blocks.extend(force.blocks);
+    outputs.repeats.extend(force.repeats);
+    outputs.blocks.push(("constraint", jacobian.value.as_ref().to_vec()));
+    outputs.blocks.push(("jacobian", jacobian.jacobian.as_ref().to_vec()));
+    outputs
+}
+
+/// Adds the blocks `next`, `next_by_unknowns` and `next_by_state`.
+#[doc(hidden)]
+pub fn evaluate_next<T: Real, E: Stateful<T>>(
+    element: &E,
+    inputs: &Inputs<'_, T>,
+    mut outputs: Outputs<T>,
+) -> Outputs<T> {
+    let u: E::Unknowns = unknowns(inputs.positions);
+    let (next, jacobians) = (element.next(&u), element.next_jacobians(&u));
+    outputs.blocks.push(("next", next.state.as_ref().to_vec()));
+    outputs.blocks.push(("next_by_unknowns", jacobians.by_unknowns.as_ref().to_vec()));
+    outputs.blocks.push(("next_by_state", jacobians.by_state.as_ref().to_vec()));
+    outputs.repeats.push(("next_jacobians", "next", jacobians.state.as_ref().to_vec()));
+    outputs
+}
+
+/// Adds the blocks of [`evaluate_next`], and `slopes_by_state`.
+#[doc(hidden)]
+pub fn evaluate_state<T: Real, E: StateSensitivity<T>>(
+    element: &E,
+    inputs: &Inputs<'_, T>,
+    outputs: Outputs<T>,
+) -> Outputs<T> {
+    let mut outputs = evaluate_next(element, inputs, outputs);
+    let slopes = element.state_jacobian(&unknowns(inputs.positions));
+    outputs.blocks.push(("slopes_by_state", slopes.by_state.as_ref().to_vec()));
+    outputs
 }
 
 #[cfg(test)]

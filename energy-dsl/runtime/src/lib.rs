@@ -30,7 +30,8 @@ pub use choose::Choose;
 pub use declaration::{Declaration, Field, FieldKind, Kind, OperationCount, Property, Routine, WeightedPoints};
 pub use element::{
     AnyElement, Block, Constraint, Element, ForceLaw, Inputs, MixedConstraint, MixedForce, MixedPotential, Outputs,
-    Potential, ReducedPotential, Residual, RestError, Stateful, Vector3, VertexPotential, triangle_index,
+    Potential, ReducedPotential, Residual, RestError, StateSensitivity, Stateful, Vector3, VertexPotential,
+    triangle_index,
 };
 #[doc(hidden)]
 pub use element::{
@@ -40,7 +41,10 @@ pub use element::{
     NextCall, NextJacobiansCall, ReducedHessianCall, ResidualCall, ResidualJacobianCall, StateJacobianCall, ValueCall,
     VertexCall,
 };
-pub use evaluate::{evaluate_constraint, evaluate_force_law, evaluate_potential, evaluate_residual};
+pub use evaluate::{
+    evaluate_constraint, evaluate_force_law, evaluate_mixed_constraint, evaluate_mixed_force, evaluate_mixed_potential,
+    evaluate_next, evaluate_potential, evaluate_residual, evaluate_state,
+};
 pub use numbers::{
     BLOCK_NUMBERS, Baseline, BlockSum, Flag, Flags, Float, Kernel, Lane, Level, LevelName, Mask, Number, Real,
     Unbounded, UnknownLevel, available, dispatch, dispatch_at, level,

@@ -29,6 +29,12 @@ pub enum RoutineKind {
     Jacobian,
     /// U, and its first and second derivatives by the point of this number.
     Vertex(u8),
+    /// The state after a step.
+    Next,
+    /// The state after a step, with its derivatives by the unknowns and by the state before.
+    NextJacobians,
+    /// ∂U/∂u and ∂²U/∂u∂(state); f and ∂f/∂(state) of a force, r and ∂r/∂(state) of a residual.
+    StateJacobian,
 }
 
 /// The names of [`RoutineKind::Vertex`]. Elements have at most 32 points.
@@ -69,7 +75,7 @@ const VERTEX_NAMES: [&str; 32] = [
 
 impl RoutineKind {
     /// All kinds of routines but those of single vertices.
-    pub const ALL: [Self; 13] = [
+    pub const ALL: [Self; 16] = [
         Self::Rest,
         Self::Value,
         Self::Gradient,
@@ -83,6 +89,9 @@ impl RoutineKind {
         Self::GaussNewton,
         Self::Residual,
         Self::Jacobian,
+        Self::Next,
+        Self::NextJacobians,
+        Self::StateJacobian,
     ];
 
     /// Returns the name of the method that runs the routine: `value`, `hessian_vector`, ….
@@ -102,6 +111,9 @@ impl RoutineKind {
             Self::GaussNewton => "gauss_newton",
             Self::Residual => "residual",
             Self::Jacobian => "jacobian",
+            Self::Next => "next",
+            Self::NextJacobians => "next_jacobians",
+            Self::StateJacobian => "state_jacobian",
             Self::Vertex(point) => VERTEX_NAMES[point as usize % VERTEX_NAMES.len()],
         }
     }
@@ -116,7 +128,7 @@ impl RoutineKind {
     /// Returns whether the first group of results is of values, not of derivatives.
     #[must_use]
     pub const fn has_values(self) -> bool {
-        !matches!(self, Self::HessianVector)
+        !matches!(self, Self::HessianVector | Self::StateJacobian)
     }
 
     /// Returns whether the first result is an energy, which is infinite outside of its domain.

@@ -104,7 +104,10 @@ fn offset(declaration: &Declaration, sample: &Sample, (what, size): (Perturbed, 
         Some(dimension) => edges(&sample.rest, dimension, &mut nudge),
         None => all(&sample.rest, &mut nudge),
     };
-    let velocities = if sample.velocities.is_empty() { Vec::new() } else { edges(&sample.velocities, 3, &mut nudge) };
+    let velocities = match has_points(declaration) && !sample.velocities.is_empty() {
+        true => edges(&sample.velocities, 3, &mut nudge),
+        false => all(&sample.velocities, &mut nudge),
+    };
     let parameters = if by_edges { none(&sample.parameters) } else { all(&sample.parameters, &mut nudge) };
     Sample { parameters, rest, positions, velocities }
 }

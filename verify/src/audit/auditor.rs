@@ -125,7 +125,7 @@ impl<'a> Auditor<'a> {
 
     fn derivative(&self, block: BlockName) -> Option<BlockName> {
         let kind = self.declaration.kind;
-        BlockName::of_kind(kind).iter().copied().find(|&upper| {
+        BlockName::of(self.declaration).into_iter().find(|&upper| {
             antiderivative(upper, kind).is_some_and(|(lower, stepped)| lower == block && stepped == Stepped::Positions)
         })
     }

@@ -24,7 +24,7 @@ impl Meter {
         let count = |routine: &Routine| routine.full.total() as u64;
         let all = declaration.routines.iter().map(count).sum::<u64>().max(1);
         let value = declaration.routines.iter().map(count).min().unwrap_or(1).max(1);
-        let n: u64 = declaration.points.iter().map(|point| point.size as u64).sum();
+        let n = declaration.increments() as u64;
         let derivatives = match declaration.kind {
             Kind::Energy | Kind::Constraint => n * (n + 1) / 2 + n,
             Kind::Force => 2 * n,

@@ -6,6 +6,7 @@ use super::auditor::Auditor;
 use super::cases::Case;
 use super::report::Check;
 use crate::blocks::{Block, BlockName};
+use crate::chart;
 use crate::sample::{Sample, has_points};
 
 /// Bisections of a path: enough to bring both ends to adjacent doubles.
@@ -44,7 +45,7 @@ impl Auditor<'_> {
         if self.subject.formula.program().audit_scope.ranges.is_empty() {
             ends.push(positions.iter().map(|x| 0.1 * x).collect());
         }
-        ends.into_iter().map(|positions| Sample { positions, ..case.sample.clone() }).collect()
+        ends.into_iter().map(|positions| self.at(&case.sample, positions)).collect()
     }
 
     /// Returns neighbouring inputs on both sides of a change of branches between two inputs; `None` if both ends take
@@ -56,7 +57,7 @@ impl Auditor<'_> {
         }
         let (mut before, mut after) = (from.clone(), to.clone());
         for _ in 0..HALVINGS {
-            let middle = between(&before, &after);
+            let middle = self.between(&before, &after);
             if middle == before || middle == after {
                 break;
             }
@@ -64,6 +65,17 @@ impl Auditor<'_> {
             *side = middle;
         }
         Some([before, after])
+    }
+
+    fn between(&self, a: &Sample, b: &Sample) -> Sample {
+        let positions = a.positions.iter().zip(&b.positions).map(|(a, b)| a + (b - a) / 2.0).collect();
+        self.at(a, positions)
+    }
+
+    /// Returns an input with other positions, where rotations have unit length.
+    fn at(&self, sample: &Sample, mut positions: Vec<f64>) -> Sample {
+        chart::normalise(self.declaration, &mut positions);
+        Sample { positions, ..sample.clone() }
     }
 
     /// Compares the values of neighbouring inputs. The scale is that of the values there, at both ends of the walk, and
@@ -105,7 +117,7 @@ impl Auditor<'_> {
         for (from, to) in sides.into_iter().zip(ends) {
             let positions =
                 from.positions.iter().zip(&to.positions).map(|(from, to)| from + 1e-8 * (to - from)).collect();
-            let moved = self.answer(&Sample { positions, ..from.clone() }).ok()?;
+            let moved = self.answer(&self.at(from, positions)).ok()?;
             let here = self.answer(from).ok()?;
             let pairs = here.block(block).numbers.iter().zip(&moved.block(block).numbers);
             most = pairs.map(|(a, b)| (a - b).abs()).fold(most, f64::max);
@@ -120,9 +132,4 @@ pub(super) fn typical_value(cases: &[Case<'_>]) -> f64 {
     let mut sizes: Vec<f64> = cases.iter().map(size).filter(|&size| size > 0.0 && size.is_finite()).collect();
     sizes.sort_by(f64::total_cmp);
     sizes.get(sizes.len() / 2).copied().unwrap_or(0.0)
-}
-
-fn between(a: &Sample, b: &Sample) -> Sample {
-    let positions = a.positions.iter().zip(&b.positions).map(|(a, b)| a + (b - a) / 2.0).collect();
-    Sample { positions, ..a.clone() }
 }

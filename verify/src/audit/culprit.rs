@@ -1,7 +1,7 @@
 //! The subexpression that loses digits, and a spelling that keeps them.
 
 use energy_compiler::{Part, Parts};
-use energy_dsl::Number;
+use energy_dsl::{Declaration, Number};
 use fastrand::Rng;
 
 use super::subject::Subject;
@@ -33,7 +33,7 @@ pub(super) fn culprit(subject: &Subject, sample: &Sample, block_order: usize, er
     };
     let orders = (order(subject.declaration.kind), block_order);
     let variations = variations(sample);
-    let errors = variations.iter().map(|sample| errors(&parts, sample, orders));
+    let errors = variations.iter().map(|sample| errors(&subject.declaration, &parts, sample, orders));
     let errors = errors.reduce(|a, b| a.into_iter().zip(b).map(|(a, b)| worse(a, b)).collect()).unwrap_or_default();
     let share = error / 300.0;
     let arises = |&index: &usize| {
@@ -57,10 +57,10 @@ fn variations(sample: &Sample) -> Vec<Sample> {
 }
 
 /// Returns the largest relative error of each subexpression and its derivatives, in roundoffs. NaN counts as infinite.
-fn errors(parts: &Parts, sample: &Sample, (order, block_order): (Order, usize)) -> Vec<f64> {
-    let doubles = parts.evaluate(&JetInputs::<f64>::new(sample, None, order).inputs());
+fn errors(declaration: &Declaration, parts: &Parts, sample: &Sample, (order, block_order): (Order, usize)) -> Vec<f64> {
+    let doubles = parts.evaluate(&JetInputs::<f64>::new(declaration, sample, None, order).inputs());
     at_precision(BITS, || {
-        let exact = parts.evaluate(&JetInputs::<Big>::new(sample, None, order).inputs());
+        let exact = parts.evaluate(&JetInputs::<Big>::new(declaration, sample, None, order).inputs());
         let pairs = exact.iter().zip(&doubles);
         pairs
             .map(|(exact, found)| (0..=block_order).map(|k| relative_error(exact, found, k)).fold(0.0, worse))

@@ -7,12 +7,12 @@ pub(super) fn entry_name(declaration: &Declaration, block: &Block, entry: usize)
     let coordinate = |number: usize| {
         let mut number = number;
         for point in &*declaration.points {
-            if number < point.size {
-                let axis =
-                    if point.size == 1 { String::new() } else { format!(".{}", ["x", "y", "z", "w"][number.min(3)]) };
+            let size = point.increments();
+            if number < size {
+                let axis = if size == 1 { String::new() } else { format!(".{}", ["x", "y", "z", "w"][number.min(3)]) };
                 return format!("{}{axis}", point.name);
             }
-            number -= point.size;
+            number -= size;
         }
         format!("component {number}")
     };
@@ -21,7 +21,10 @@ pub(super) fn entry_name(declaration: &Declaration, block: &Block, entry: usize)
         BlockName::Energy => "U".into(),
         BlockName::Constraint | BlockName::Residual => format!("row {column}"),
         BlockName::Gradient | BlockName::Force => coordinate(column),
-        BlockName::Jacobian => format!("(row {row}, {})", coordinate(column)),
+        BlockName::Jacobian | BlockName::NextByUnknowns => format!("(row {row}, {})", coordinate(column)),
+        BlockName::Next => format!("state number {column}"),
+        BlockName::NextByState => format!("(row {row}, state number {column})"),
+        BlockName::SlopesByState => format!("({}, state number {column})", coordinate(row)),
         _ => format!("({}, {})", coordinate(row), coordinate(column)),
     }
 }

@@ -9,6 +9,7 @@ use super::entry::entry_name;
 use super::extremes::Extreme;
 use super::report::{Check, Warning};
 use crate::blocks::{Answer, Block, largest};
+use crate::chart;
 use crate::multiprecision::{TrueBlock, Truth, truth_of_extreme, worse};
 use crate::sample::Sample;
 
@@ -137,7 +138,8 @@ impl Auditor<'_> {
         let mut found: Option<Vec<Option<TrueBlock>>> = None;
         for _ in 0..DIRECTIONS {
             let scale = largest(&sample.positions).max(1.0) * DISTANCE;
-            let positions = sample.positions.iter().map(|_| scale * (2.0 * random.f64() - 1.0)).collect();
+            let mut positions: Vec<f64> = sample.positions.iter().map(|_| scale * (2.0 * random.f64() - 1.0)).collect();
+            chart::along(&subject.declaration, &sample.positions, &mut positions);
             let none = |numbers: &[f64]| vec![0.0; numbers.len()];
             let offset = Sample {
                 positions,

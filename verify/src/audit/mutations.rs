@@ -94,8 +94,8 @@ fn largest_difference(
         subject.meter.exact_routines();
         let [blocks, repeats] = exact_differences(sound, broken, &case.sample)?;
         let answer = subject.answer(&case.sample).ok()?;
-        let names = BlockName::of_kind(subject.declaration.kind).iter();
-        let kappa = names.map(|&block| amplification(subject, &case.sample, &answer, block)).fold(1.0, f64::max);
+        let names = BlockName::of(&subject.declaration).into_iter();
+        let kappa = names.map(|block| amplification(subject, &case.sample, &answer, block)).fold(1.0, f64::max);
         let allowed = Check::Accuracy.tolerance() * f64::EPSILON * kappa;
         most = most.max(blocks / allowed).max(repeats / Check::Routines.tolerance());
     }

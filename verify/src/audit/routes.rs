@@ -47,10 +47,11 @@ impl Auditor<'_> {
         let length = self.length(&case.sample, stepped);
         let here = self.subject.branches(&case.sample);
         let found = sweep(
+            self.declaration,
             &case.sample,
             stepped,
             length,
-            &block.numbers,
+            (block.name, &block.numbers),
             |moved| self.subject.lower_block(lower, moved),
             |moved| {
                 (here.is_empty() || self.subject.branches(moved) == here)

@@ -9,6 +9,7 @@ use fastrand::Rng;
 use super::budget::Meter;
 use super::report::Check;
 use crate::blocks::{Answer, BlockName, NoAnswer, evaluate, largest};
+use crate::chart;
 use crate::formula::rows;
 use crate::sample::{Sample, Sampler};
 
@@ -173,6 +174,7 @@ impl Subject {
             BlockName::Gradient => Some(("gradient", 1)),
             BlockName::Force => Some(("force", 0)),
             BlockName::Residual => Some(("residual", 0)),
+            BlockName::Next => Some(("next", 0)),
             _ => None,
         };
         if let (Some(routines), Some((name, group))) = (&self.routines, routine) {
@@ -213,6 +215,7 @@ impl Subject {
             let mut moved = sample.clone();
             let scale = largest(&sample.positions).max(f64::MIN_POSITIVE);
             moved.positions.iter_mut().for_each(|x| *x += NEARBY * scale * (2.0 * random.f64() - 1.0));
+            chart::normalise(&self.declaration, &mut moved.positions);
             !self.has_value(&moved)
         })
     }

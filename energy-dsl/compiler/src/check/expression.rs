@@ -470,11 +470,12 @@ impl<'a> Checker<'a> {
         }
     }
 
-    /// Checks `gradient(U, p)`, the derivative of a scalar with respect to a point or a parameter.
+    /// Checks `gradient(U, p)`, the derivative of a scalar with respect to an unknown or a parameter.
     #[inline(never)]
     fn gradient(&mut self, name: &Name, arguments: &'a [Expression]) -> Option<Typed> {
         let [of, by] = arguments else {
-            return self.error(&name.span, "`gradient` takes a scalar and a point or parameter, as in gradient(θ, x1)");
+            return self
+                .error(&name.span, "`gradient` takes a scalar and an unknown or parameter, as in gradient(θ, x1)");
         };
         let (of_typed, by_typed) = (self.expression(of), self.expression(by));
         let (of_typed, by_typed) = (of_typed?, by_typed?);
@@ -483,10 +484,11 @@ impl<'a> Checker<'a> {
         }
         match by_typed.kind {
             TypedKind::Input(source @ (Source::Position | Source::Parameter), first) => {
-                let shape = by_typed.shape;
-                if source == Source::Position && shape != Shape::Vector(3) {
-                    return self.error(&by.span, "`gradient` is by a point or a parameter, not by this unknown");
-                }
+                let shape = match by_typed.shape {
+                    // By the increment of a rotation: a torque.
+                    Shape::Quat if source == Source::Position && self.signature.is_rotation(first) => Shape::Vector(3),
+                    shape => shape,
+                };
                 if !matches!(shape, Shape::Scalar | Shape::Vector(_) | Shape::Matrix(..)) {
                     return self
                         .error(&by.span, format!("`gradient` is by a scalar, vector or matrix, not by {shape}"));
@@ -502,7 +504,7 @@ impl<'a> Checker<'a> {
                 let kind = TypedKind::Gradient(Box::new(of_typed), source, first);
                 Some(Typed { kind, shape, span: name.span.clone() })
             }
-            _ => self.error(&by.span, "`gradient` is by a declared point or parameter"),
+            _ => self.error(&by.span, "`gradient` is by a declared unknown or parameter"),
         }
     }
 

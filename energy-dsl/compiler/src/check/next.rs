@@ -1,9 +1,11 @@
 //! Checks `next { … }`: the state of an element after an accepted step. All right sides read the old state.
 
+use std::collections::BTreeSet;
+
 use super::expression::Checker;
 use super::result::rows;
 use super::signature::{InputName, Signature};
-use super::typed::{Typed, TypedKind};
+use super::typed::{Binding, Source, Typed, TypedKind};
 use crate::diagnostic::{Diagnostic, Diagnostics, nearest};
 use crate::functions::Shape;
 use crate::syntax::{Body, Declaration, Let, Next};
@@ -44,6 +46,13 @@ impl<'a> Checker<'a> {
             self.diagnostics.push(Diagnostic::new(&next.span, message).help(help));
             return None;
         }
+        let bindings = &self.bindings;
+        if values.iter().flatten().any(|value| reads_velocities(bindings, value, &mut BTreeSet::new())) {
+            let message = "`next` depends on velocities, which it does not know";
+            let help = "keep the positions of the last step in a state, and take their difference";
+            self.diagnostics.push(Diagnostic::new(&next.span, message).help(help));
+            return None;
+        }
         let entries = values.into_iter().flatten().flat_map(|value| match value.kind {
             TypedKind::Array(entries) => entries,
             _ => vec![value],
@@ -80,6 +89,17 @@ impl<'a> Checker<'a> {
             return None;
         }
         Some((number, checked))
+    }
+}
+
+/// Returns whether a value depends on velocities, through bindings too.
+fn reads_velocities(bindings: &[Binding], typed: &Typed, seen: &mut BTreeSet<usize>) -> bool {
+    match &typed.kind {
+        TypedKind::Input(source, _) => *source == Source::Velocity,
+        TypedKind::Binding(number) => {
+            seen.insert(*number) && reads_velocities(bindings, &bindings[*number].value, seen)
+        }
+        _ => typed.parts().into_iter().any(|part| reads_velocities(bindings, part, seen)),
     }
 }
 

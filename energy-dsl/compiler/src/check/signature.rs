@@ -38,6 +38,11 @@ impl Signature {
         Self { moving: Vec::new(), rest: Vec::new(), parameters: Vec::new(), states: 0, names: Vec::new() }
     }
 
+    /// Returns whether the unknown that begins with this number is a rotation.
+    pub(super) fn is_rotation(&self, first: usize) -> bool {
+        self.moving.iter().any(|input| input.first == first && input.input_type.element.is_rotation())
+    }
+
     /// Returns whether the parameter that begins with this number is part of the state.
     pub(super) fn is_state(&self, first: usize) -> bool {
         let own = self.parameters.len() - self.states;

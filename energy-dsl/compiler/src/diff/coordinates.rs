@@ -2,27 +2,22 @@ use std::collections::BTreeMap;
 
 use super::forward::Sparse;
 use super::linear::{self, Front};
+use super::unknowns::{Axis, Moving, Unknown, Unknowns};
 use super::weights::Sum;
 use crate::graph::{Graph, Input, NodeId};
+use energy_runtime::FieldKind;
 
-/// The inputs that derivatives are taken with respect to.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Moving {
-    /// Positions of points, or unknowns.
-    Positions,
-    /// Velocities of points.
-    Velocities,
-}
-
-/// Reduced coordinates: independent linear functions of the points through which the points enter the formula.
+/// Reduced coordinates: independent linear functions of the unknowns through which these enter the formula.
 #[derive(Clone, Debug)]
 pub struct Coordinates {
     /// Dual parts, constants, of the nodes where differentiation starts.
     pub(super) seeds: BTreeMap<NodeId, Sparse>,
-    /// Points of each coordinate vector, with weights. Coordinate c is component c % 3 of vector c / 3.
+    /// Unknowns of each coordinate vector, with weights.
     pub vectors: Vec<Vec<(usize, f64)>>,
-    /// Components of a vector.
-    pub components: usize,
+    /// Number of the first coordinate of each vector, and then the number of all coordinates.
+    starts: Vec<usize>,
+    /// The unknowns that derivatives are expanded to.
+    pub(super) unknowns: Vec<Unknown>,
     /// Whether no translation of all points changes the outputs.
     pub translation_invariant: bool,
 }
@@ -31,25 +26,45 @@ impl Coordinates {
     /// Returns the number of coordinates.
     #[must_use]
     pub fn len(&self) -> usize {
-        self.vectors.len() * self.components
+        self.starts.last().copied().unwrap_or(0)
     }
 
-    /// Creates one coordinate for each unknown.
-    pub fn of_unknowns(g: &mut Graph, unknowns: usize) -> Self {
-        let one = g.constant(1.0);
-        let seeds = (0..unknowns)
-            .map(|u| (g.input(Input::Position(u16::try_from(u).expect("few unknowns"))), vec![(u, one)]))
-            .collect();
-        let vectors = (0..unknowns).map(|u| vec![(u, 1.0)]).collect();
-        Self { seeds, vectors, components: 1, translation_invariant: false }
+    /// Returns the number of a component of a vector.
+    pub(super) fn number(&self, vector: usize, axis: usize) -> usize {
+        self.starts[vector] + axis
+    }
+
+    /// Returns the number of components of a vector.
+    pub(super) fn components(&self, vector: usize) -> usize {
+        self.starts[vector + 1] - self.starts[vector]
+    }
+
+    /// Returns the vector of a coordinate, and its component.
+    fn place(&self, coordinate: usize) -> (usize, usize) {
+        let vector = self.starts.partition_point(|&start| start <= coordinate) - 1;
+        (vector, coordinate - self.starts[vector])
+    }
+
+    /// Creates coordinates that are single numbers.
+    fn of_numbers(seeds: BTreeMap<NodeId, Sparse>, numbers: usize) -> Self {
+        let unknown =
+            |number| Unknown { increments: 1, first_increment: number, first_number: number, kind: FieldKind::Numbers };
+        let vectors = (0..numbers).map(|number| vec![(number, 1.0)]).collect();
+        let unknowns = (0..numbers).map(unknown).collect();
+        Self { seeds, vectors, starts: (0..=numbers).collect(), unknowns, translation_invariant: false }
+    }
+
+    /// Creates one coordinate for each coordinate in which the unknowns move.
+    pub fn of_unknowns(g: &mut Graph, unknowns: &Unknowns) -> Self {
+        let nodes: Vec<NodeId> = unknowns.inputs().into_iter().map(|input| g.input(input)).collect();
+        Self::of_nodes(g, &nodes)
     }
 
     /// Creates one coordinate for each node.
     pub fn of_nodes(g: &mut Graph, nodes: &[NodeId]) -> Self {
         let one = g.constant(1.0);
         let seeds = nodes.iter().enumerate().map(|(number, &node)| (node, vec![(number, one)])).collect();
-        let vectors = (0..nodes.len()).map(|number| vec![(number, 1.0)]).collect();
-        Self { seeds, vectors, components: 1, translation_invariant: false }
+        Self::of_numbers(seeds, nodes.len())
     }
 
     /// Creates the coordinates of one point. Only these move.
@@ -59,9 +74,9 @@ impl Coordinates {
             let mut weights = [0.0; 3];
             for &(coordinate, sign) in entries {
                 let sign = g.as_constant(sign).expect("compiler bug: seeds are constants");
-                let vector = &self.vectors[coordinate / self.components];
-                let weight = vector.iter().filter(|(other, _)| *other == point).map(|(_, weight)| weight).sum::<f64>();
-                weights[coordinate % self.components] += sign * weight;
+                let (vector, axis) = self.place(coordinate);
+                let parts = self.vectors[vector].iter().filter(|(other, _)| *other == point);
+                weights[axis] += sign * parts.map(|(_, weight)| weight).sum::<f64>();
             }
             let parts = weights.iter().enumerate().filter(|(_, weight)| **weight != 0.0);
             let seed: Sparse = parts.map(|(axis, &weight)| (axis, g.constant(weight))).collect();
@@ -69,7 +84,8 @@ impl Coordinates {
                 seeds.insert(node, seed);
             }
         }
-        Self { seeds, vectors: vec![vec![(point, 1.0)]], components: 3, translation_invariant: false }
+        let unknowns = self.unknowns.clone();
+        Self { seeds, vectors: vec![vec![(point, 1.0)]], starts: vec![0, 3], unknowns, translation_invariant: false }
     }
 
     /// Creates a single coordinate, the distance along a direction that is given in these coordinates.
@@ -79,18 +95,18 @@ impl Coordinates {
             let parts: Vec<_> = entries.iter().map(|&(c, sign)| g.mul(direction[c], sign)).collect();
             seeds.insert(node, vec![(0, g.sum(parts))]);
         }
-        Self { seeds, vectors: vec![vec![(0, 1.0)]], components: 1, translation_invariant: false }
+        Self::of_numbers(seeds, 1)
     }
 
-    /// Returns the rates of all coordinates, given the velocities of the points or any other direction.
+    /// Returns the rates of all coordinates, given the velocities of the unknowns or any other direction.
     pub fn rates(&self, g: &mut Graph) -> Vec<NodeId> {
         let mut rates = Vec::with_capacity(self.len());
-        for vector in &self.vectors {
-            for axis in 0..self.components {
+        for (number, vector) in self.vectors.iter().enumerate() {
+            for axis in 0..self.components(number) {
                 let mut sum = g.constant(0.0);
-                for &(point, weight) in vector {
-                    let number = u16::try_from(self.components * point + axis).expect("few points");
-                    let velocity = g.input(Input::Velocity(number));
+                for &(unknown, weight) in vector {
+                    let increment = self.unknowns[unknown].first_increment + axis;
+                    let velocity = g.input(Input::Velocity(u16::try_from(increment).expect("few unknowns")));
                     sum = add_weighted(g, sum, weight, velocity);
                 }
                 rates.push(sum);
@@ -99,27 +115,35 @@ impl Coordinates {
         rates
     }
 
-    /// Finds the differences of points that `outputs` depend on, or fewer linear functions of the points.
-    pub fn of_points(g: &mut Graph, outputs: &[NodeId], moving: Moving) -> Self {
-        let differences = Front::of_differences(g, outputs, moving);
-        let functions = Front::of_linear_functions(g, outputs, moving);
+    /// Finds the differences of unknowns that `outputs` depend on, or fewer linear functions of them.
+    pub fn reduced(g: &mut Graph, outputs: &[NodeId], unknowns: &Unknowns, moving: Moving) -> Self {
+        let differences = Front::of_differences(g, outputs, unknowns, moving);
+        let functions = Front::of_linear_functions(g, outputs, unknowns, moving);
         let fewer = functions.filter(|functions| functions.span.basis.len() < differences.span.basis.len());
         let front = fewer.unwrap_or(differences);
+        let basis = &front.span.basis;
+        let mut starts = vec![0];
+        for sum in basis {
+            let (unknown, _) = sum.iter().next().expect("compiler bug: an independent sum is not 0");
+            starts.push(starts[starts.len() - 1] + unknowns.list[unknown].increments);
+        }
         // Weights of points are at most 1, so that no derivative overflows as it is expanded to points.
-        let scales: Vec<f64> = front.span.basis.iter().map(|sum| power_of_two_above(sum.largest()).max(1.0)).collect();
-        let seed = |g: &mut Graph, axis: usize, sum: &Sum| -> Sparse {
-            sum.iter().map(|(vector, weight)| (3 * vector + axis, g.constant(weight * scales[vector]))).collect()
+        let scales: Vec<f64> = basis.iter().map(|sum| power_of_two_above(sum.largest()).max(1.0)).collect();
+        let seed = |g: &mut Graph, axis: Axis, sum: &Sum| -> Sparse {
+            sum.iter()
+                .map(|(vector, weight)| (starts[vector] + axis.number, g.constant(weight * scales[vector])))
+                .collect()
         };
         let seeds = front.nodes.iter().map(|(&node, (axis, sum))| (node, seed(g, *axis, sum))).collect();
-        let basis = &front.span.basis;
         let vectors = basis.iter().zip(&scales).map(|(sum, scale)| {
             let mut points: Vec<_> = sum.iter().map(|(point, weight)| (point, weight / scale)).collect();
             // A difference is written as such.
             points.sort_by(|(_, a), (_, b)| b.total_cmp(a));
             points
         });
-        let translation_invariant = linear::is_translation_invariant(g, outputs, moving);
-        Self { seeds, vectors: vectors.collect(), components: 3, translation_invariant }
+        let translation_invariant = linear::is_translation_invariant(g, outputs, unknowns, moving);
+        let (vectors, unknowns) = (vectors.collect(), unknowns.list.clone());
+        Self { seeds, vectors, starts, unknowns, translation_invariant }
     }
 }
 

@@ -21,7 +21,7 @@ pub fn only_dihedral(g: &Graph, output: NodeId, coordinates: &Coordinates) -> Op
             if *angle.get_or_insert(node) != node {
                 return None;
             }
-        } else if matches!(g.op(node), Op::Input(Input::Position(_) | Input::Velocity(_))) {
+        } else if matches!(g.op(node), Op::Input(Input::Position(_) | Input::Velocity(_) | Input::Increment(_))) {
             return None;
         } else {
             stack.extend(moving_operands(g, node, Order::Second));

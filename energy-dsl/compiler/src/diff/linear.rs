@@ -1,13 +1,14 @@
-//! Finds the linear functions of the points through which the points enter a formula. Their weights are exact, so that
-//! the number of independent ones, and invariance under translations, are facts and no estimates.
+//! Finds the linear functions of the unknowns through which these enter a formula: differences of points, of angles, ….
+//! Their weights are exact, so that the number of independent ones, and invariance under translations, are facts and no
+//! estimates.
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::coordinates::Moving;
 use super::local::Order;
+use super::unknowns::{Axis, Moving, Unknowns};
 use super::weights::{Span, Sum, Weight};
 use super::{differentiable, moving_operands};
-use crate::graph::{Graph, Input, NodeId, Op};
+use crate::graph::{Graph, NodeId, Op};
 
 /// The largest weight of an independent sum in another one. Rounding errors of larger ones would be felt.
 const LARGEST: f64 = 100.0;
@@ -16,15 +17,15 @@ const LARGEST: f64 = 100.0;
 #[derive(Default)]
 pub(super) struct Front {
     /// The nodes, each with its axis and the weights of the independent sums that it is made of.
-    pub(super) nodes: BTreeMap<NodeId, (usize, Sum)>,
+    pub(super) nodes: BTreeMap<NodeId, (Axis, Sum)>,
     /// The independent sums of points.
     pub(super) span: Span,
 }
 
 impl Front {
     /// Finds the points and the differences of two points that `outputs` are computed from.
-    pub(super) fn of_differences(g: &Graph, outputs: &[NodeId], moving: Moving) -> Self {
-        let coordinate = |node| coordinate(g, node, moving);
+    pub(super) fn of_differences(g: &Graph, outputs: &[NodeId], unknowns: &Unknowns, moving: Moving) -> Self {
+        let coordinate = |node| unknowns.coordinate(g, node, moving);
         let mut front = Self::default();
         for &output in outputs {
             if let Some((point, axis)) = coordinate(output) {
@@ -49,11 +50,16 @@ impl Front {
     }
 
     /// Finds the last linear functions of points on all paths to `outputs`; `None` if some are almost dependent.
-    pub(super) fn of_linear_functions(g: &Graph, outputs: &[NodeId], moving: Moving) -> Option<Self> {
-        let mut linear: BTreeMap<NodeId, (usize, Sum)> = BTreeMap::new();
+    pub(super) fn of_linear_functions(
+        g: &Graph,
+        outputs: &[NodeId],
+        unknowns: &Unknowns,
+        moving: Moving,
+    ) -> Option<Self> {
+        let mut linear: BTreeMap<NodeId, (Axis, Sum)> = BTreeMap::new();
         let mut front = Self::default();
         for node in between(g, outputs) {
-            if let Some(function) = linear_function(g, node, moving, &linear) {
+            if let Some(function) = linear_function(g, node, (unknowns, moving), &linear) {
                 linear.insert(node, function);
                 continue;
             }
@@ -71,7 +77,7 @@ impl Front {
         front.nodes.values().all(|(_, sum)| sum.largest() <= LARGEST).then_some(front)
     }
 
-    fn add(&mut self, node: NodeId, axis: usize, sum: &Sum) {
+    fn add(&mut self, node: NodeId, axis: Axis, sum: &Sum) {
         let in_basis = self.span.in_basis(sum);
         self.nodes.insert(node, (axis, in_basis));
     }
@@ -79,12 +85,13 @@ impl Front {
 
 /// Returns whether a translation of all points changes nothing that `outputs` are computed from, conditions included,
 /// but for rounding errors.
-pub(super) fn is_translation_invariant(g: &Graph, outputs: &[NodeId], moving: Moving) -> bool {
+pub(super) fn is_translation_invariant(g: &Graph, outputs: &[NodeId], unknowns: &Unknowns, moving: Moving) -> bool {
     let operands = |node: NodeId| match g.rule(node) {
         Some(rule) => rule.arguments.clone(),
         None if g.op(node).is_constant_in_exact_arithmetic() => Vec::new(),
         None => g.op(node).operands().collect(),
     };
+    let cancels = |sum: &Sum| sum.cancels(|unknown| unknowns.translates(unknown));
     let mut seen: BTreeSet<NodeId> = BTreeSet::new();
     let mut stack = outputs.to_vec();
     while let Some(node) = stack.pop() {
@@ -92,15 +99,15 @@ pub(super) fn is_translation_invariant(g: &Graph, outputs: &[NodeId], moving: Mo
             stack.extend(operands(node));
         }
     }
-    let mut linear: BTreeMap<NodeId, (usize, Sum)> = BTreeMap::new();
+    let mut linear: BTreeMap<NodeId, (Axis, Sum)> = BTreeMap::new();
     for node in seen {
-        if let Some(function) = linear_function(g, node, moving, &linear) {
+        if let Some(function) = linear_function(g, node, (unknowns, moving), &linear) {
             linear.insert(node, function);
-        } else if operands(node).iter().filter_map(|operand| linear.get(operand)).any(|(_, sum)| !sum.cancels()) {
+        } else if operands(node).iter().filter_map(|operand| linear.get(operand)).any(|(_, sum)| !cancels(sum)) {
             return false;
         }
     }
-    outputs.iter().filter_map(|output| linear.get(output)).all(|(_, sum)| sum.cancels())
+    outputs.iter().filter_map(|output| linear.get(output)).all(|(_, sum)| cancels(sum))
 }
 
 /// Returns the nodes between the points and `outputs` that first or second derivatives pass through.
@@ -113,33 +120,23 @@ fn operands(g: &Graph, node: NodeId) -> BTreeSet<NodeId> {
     [Order::First, Order::Second].into_iter().flat_map(|order| moving_operands(g, node, order)).collect()
 }
 
-/// Returns the point and the axis of an input that moves.
-fn coordinate(g: &Graph, node: NodeId, moving: Moving) -> Option<(usize, usize)> {
-    match (g.op(node), moving) {
-        (Op::Input(Input::Position(c)), Moving::Positions) | (Op::Input(Input::Velocity(c)), Moving::Velocities) => {
-            Some((usize::from(c) / 3, usize::from(c) % 3))
-        }
-        _ => None,
-    }
-}
-
 /// Returns the axis and the weights of a node that is a sum of points along one axis, up to a constant.
 fn linear_function(
     g: &Graph,
     node: NodeId,
-    moving: Moving,
-    known: &BTreeMap<NodeId, (usize, Sum)>,
-) -> Option<(usize, Sum)> {
-    if let Some((point, axis)) = coordinate(g, node, moving) {
+    (unknowns, moving): (&Unknowns, Moving),
+    known: &BTreeMap<NodeId, (Axis, Sum)>,
+) -> Option<(Axis, Sum)> {
+    if let Some((point, axis)) = unknowns.coordinate(g, node, moving) {
         return Some((axis, Sum::of(point)));
     }
     let constant = |node| g.as_constant(node).and_then(Weight::of);
-    let paid = |axis: usize, sum: Sum| {
+    let paid = |axis: Axis, sum: Sum| {
         g.budget().spend(sum.len(), 0);
         Some((axis, sum))
     };
     let scaled = |node, factor: Weight| {
-        let (axis, sum): &(usize, Sum) = known.get(&node)?;
+        let (axis, sum): &(Axis, Sum) = known.get(&node)?;
         paid(*axis, sum.times(factor))
     };
     let added = |a: NodeId, b: NodeId, sign: Weight| {

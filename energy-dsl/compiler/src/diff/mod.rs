@@ -14,13 +14,15 @@ mod forward;
 mod linear;
 mod local;
 mod routes;
+mod unknowns;
 mod weights;
 
-pub use coordinates::{Coordinates, Moving};
+pub use coordinates::Coordinates;
 pub use dihedral::only_dihedral;
 pub use forward::{first_derivatives, second_derivatives};
 pub use local::Order;
 pub use routes::{Route, Routes, SecondOrder, first_order, hessian_vector, second_order};
+pub use unknowns::{Moving, Unknown, Unknowns, by_increments};
 
 use std::collections::{BTreeMap, BTreeSet};
 

@@ -64,7 +64,8 @@ fn documentation(program: &Program, plan: &Plan) -> Vec<String> {
     let mut lines = program.docs.clone();
     let list = |inputs: &[DeclaredInput]| inputs.iter().map(|i| i.name.clone()).collect::<Vec<_>>().join(", ");
     lines.extend(["".into(), "# Formula".into(), "```text".into(), program.formula.clone(), "```".into()]);
-    let moving = if program.kind == Kind::Residual { "unknowns" } else { "points" };
+    let is_flat = program.kind == Kind::Residual || program.is_mixed();
+    let moving = if is_flat { "unknowns" } else { "points" };
     lines.push(format!("A declared {} of the {moving} {}.", program.kind.keyword(), list(&program.moving)));
     let primitives = &plan.declaration.primitives;
     if !primitives.is_empty() {
@@ -196,13 +197,25 @@ fn element(emitter: &Emitter<'_>) -> TokenStream {
     let declaration = declaration(&plan.declaration);
     let evaluate = format_ident!(
         "evaluate_{}",
-        match program.kind {
-            Kind::Energy => "potential",
-            Kind::Constraint => "constraint",
-            Kind::Force => "force_law",
-            Kind::Residual => "residual",
+        match (program.kind, program.is_mixed()) {
+            (Kind::Energy, false) => "potential",
+            (Kind::Energy, true) => "mixed_potential",
+            (Kind::Constraint, false) => "constraint",
+            (Kind::Constraint, true) => "mixed_constraint",
+            (Kind::Force, false) => "force_law",
+            (Kind::Force, true) => "mixed_force",
+            (Kind::Residual, _) => "residual",
         }
     );
+    let outputs = match (program.states > 0, program.kind) {
+        (false, _) => quote!(Ok(::energy_dsl::#evaluate(&element, inputs))),
+        (true, Kind::Force) => {
+            quote!(Ok(::energy_dsl::evaluate_next(&element, inputs, ::energy_dsl::#evaluate(&element, inputs))))
+        }
+        (true, _) => {
+            quote!(Ok(::energy_dsl::evaluate_state(&element, inputs, ::energy_dsl::#evaluate(&element, inputs))))
+        }
+    };
     quote! {
         impl<S: ::energy_dsl::Real> ::energy_dsl::Element for #name<S> {
             const DECLARATION: &'static ::energy_dsl::Declaration = &#declaration;
@@ -212,7 +225,7 @@ fn element(emitter: &Emitter<'_>) -> TokenStream {
                 inputs: &::energy_dsl::Inputs<'_, T>,
             ) -> ::core::result::Result<::energy_dsl::Outputs<T>, ::energy_dsl::RestError> {
                 let element = #name::<T>::from_flat(inputs.rest, inputs.parameters)?;
-                Ok(::energy_dsl::#evaluate(&element, inputs))
+                #outputs
             }
         }
     }
@@ -254,6 +267,8 @@ fn packed(emitter: &Emitter<'_>) -> TokenStream {
     }
     let marker = holds_nothing(program, plan).then(|| quote!(number: ::core::marker::PhantomData,));
     let traits = match program.kind {
+        Kind::Energy | Kind::Constraint if program.is_mixed() => vec!["PackedMixed"],
+        Kind::Force if program.is_mixed() => Vec::new(),
         Kind::Energy => vec!["PackedPotential"],
         Kind::Constraint => vec!["PackedPotential", "PackedForce"],
         Kind::Force => vec!["PackedForce"],

@@ -39,8 +39,10 @@ struct Field {
 
 impl Method {
     fn new(routine: &RoutinePlan, program: &Program) -> Self {
-        let (call, result) = names(routine.kind);
+        let is_mixed = program.is_mixed();
+        let (call, result) = names(routine.kind, is_mixed);
         let field = |(&(name, shape), size): (&(&str, Shape), usize)| {
+            let shape = if is_mixed { shape.flat() } else { shape };
             let length = match shape {
                 Shape::Number | Shape::Numbers => size,
                 Shape::Vectors => size / 3,
@@ -48,13 +50,20 @@ impl Method {
             };
             Field { name: format_ident!("{name}"), shape, field_type: array(shape, length) }
         };
-        let points = || array(Shape::Vectors, program.points());
-        let arguments = match routine.kind {
-            RoutineKind::Residual | RoutineKind::Jacobian => vec![("u", array(Shape::Numbers, program.moving_size()))],
-            RoutineKind::HessianVector | RoutineKind::Force | RoutineKind::Jacobians => {
-                vec![("x", points()), ("v", points())]
+        let (unknowns, rates) = match is_flat(program, routine.kind) {
+            true => {
+                let [unknowns, increments] =
+                    [program.moving_size(), program.increments()].map(|length| array(Shape::Numbers, length));
+                (("u", unknowns), ("v", increments))
             }
-            _ => vec![("x", points())],
+            false => {
+                let points = array(Shape::Vectors, program.points());
+                (("x", points.clone()), ("v", points))
+            }
+        };
+        let arguments = match routine.kind {
+            RoutineKind::HessianVector | RoutineKind::Force | RoutineKind::Jacobians => vec![unknowns, rates],
+            _ => vec![unknowns],
         };
         Self {
             name: format_ident!("{}", routine.kind.name()),
@@ -83,9 +92,27 @@ impl Method {
     }
 }
 
+/// Returns whether a routine takes the unknowns as flat numbers `u`, not as points `x`.
+fn is_flat(program: &Program, kind: RoutineKind) -> bool {
+    use RoutineKind::{Next, NextJacobians, StateJacobian};
+    program.is_mixed() || program.kind == Kind::Residual || matches!(kind, Next | NextJacobians | StateJacobian)
+}
+
 /// Returns the kernel that calls a routine, and the struct that it returns.
-fn names(kind: RoutineKind) -> (&'static str, &'static str) {
+fn names(kind: RoutineKind, is_mixed: bool) -> (&'static str, &'static str) {
     match kind {
+        RoutineKind::Value if is_mixed => ("MixedValueCall", "Value"),
+        RoutineKind::Gradient if is_mixed => ("MixedGradientCall", "MixedGradient"),
+        RoutineKind::Hessian if is_mixed => ("MixedHessianCall", "MixedHessian"),
+        RoutineKind::HessianVector if is_mixed => ("MixedProductCall", "MixedProduct"),
+        RoutineKind::Force if is_mixed => ("MixedForceCall", "MixedForceValue"),
+        RoutineKind::Jacobians if is_mixed => ("MixedJacobiansCall", "MixedJacobians"),
+        RoutineKind::ConstraintJacobian if is_mixed => ("MixedConstraintJacobianCall", "MixedConstraintJacobian"),
+        RoutineKind::ConstraintHessian if is_mixed => ("MixedConstraintHessianCall", "MixedConstraintHessian"),
+        RoutineKind::GaussNewton if is_mixed => ("MixedGaussNewtonCall", "MixedHessian"),
+        RoutineKind::Next => ("NextCall", "NextState"),
+        RoutineKind::NextJacobians => ("NextJacobiansCall", "NextJacobians"),
+        RoutineKind::StateJacobian => ("StateJacobianCall", "StateJacobian"),
         RoutineKind::Value => ("ValueCall", "Value"),
         RoutineKind::Gradient => ("GradientCall", "Gradient"),
         RoutineKind::Hessian => ("HessianCall", "Hessian"),
@@ -217,7 +244,7 @@ fn method(emitter: &Emitter<'_>, routine: &RoutinePlan, owner: &Ident) -> Emitte
     let result_type = method.result_type();
     let (names, types): (Vec<_>, Vec<_>) = arguments.iter().map(|(name, of)| (name, of)).unzip();
     let arguments = quote!(&self, #(#names: &#types),*);
-    let ordinary = body(emitter, &method, &routine.ordinary);
+    let ordinary = body(emitter, &method, routine.kind, &routine.ordinary);
     let (body, general) = match &routine.general {
         None => (ordinary, TokenStream::new()),
         Some(general) => {
@@ -254,7 +281,7 @@ fn method(emitter: &Emitter<'_>, routine: &RoutinePlan, owner: &Ident) -> Emitte
                 let (#(#fields),*) = Self::#in_general(&[#(#inputs),*], ordinary, here);
                 ::energy_dsl::#result { #(#fields),* }
             };
-            let [guards, guard] = [&general.before, &general.guard].map(|code| mask(emitter, code));
+            let [guards, guard] = [&general.before, &general.guard].map(|code| mask(emitter, routine.kind, code));
             let general = quote! {
                 /// Whether the guards of the ordinary path hold. Its results may still be infinite.
                 #[inline(always)]
@@ -361,7 +388,8 @@ fn with_care(
     });
     let outputs = outputs.collect();
     let (sizes, values_first, is_energy) = (routine.sizes(), routine.kind.has_values(), routine.kind.is_energy());
-    let inputs: Vec<TokenStream> = inputs.iter().map(|&input| read_input(emitter.program, input)).collect();
+    let inputs: Vec<TokenStream> =
+        inputs.iter().map(|&input| read_input(emitter.program, routine.kind, input)).collect();
     let (reads, returns) = (inputs.len(), sizes.iter().sum());
     let what = format!("`{}` of [`{owner}`].", method.name);
     let code = quote! {
@@ -400,8 +428,8 @@ fn with_care(
 }
 
 /// Emits statements and the mask of a guard.
-fn mask(emitter: &Emitter<'_>, code: &Code) -> TokenStream {
-    returned_mask(emitter, code, &mut |input| read_input(emitter.program, input))
+fn mask(emitter: &Emitter<'_>, kind: RoutineKind, code: &Code) -> TokenStream {
+    returned_mask(emitter, code, &mut |input| read_input(emitter.program, kind, input))
 }
 
 fn returned_mask(emitter: &Emitter<'_>, code: &Code, read: &mut dyn FnMut(Input) -> TokenStream) -> TokenStream {
@@ -411,8 +439,8 @@ fn returned_mask(emitter: &Emitter<'_>, code: &Code, read: &mut dyn FnMut(Input)
 }
 
 /// Emits statements and the returned struct.
-fn body(emitter: &Emitter<'_>, method: &Method, code: &Code) -> TokenStream {
-    let rendered = emitter.rendered(code, &mut |input| read_input(emitter.program, input));
+fn body(emitter: &Emitter<'_>, method: &Method, kind: RoutineKind, code: &Code) -> TokenStream {
+    let rendered = emitter.rendered(code, &mut |input| read_input(emitter.program, kind, input));
     let values = method.fields.iter().zip(&code.groups).map(|(Field { name, shape, .. }, group)| {
         let value = arranged(*shape, &rendered.numbers(group));
         quote!(#name: #value)
@@ -427,24 +455,26 @@ fn body(emitter: &Emitter<'_>, method: &Method, code: &Code) -> TokenStream {
 }
 
 /// Reads an input in a method.
-fn read_input(program: &Program, input: Input) -> TokenStream {
-    let coordinate = |list: &str, i: u16| {
-        let (list, point, axis) = (format_ident!("{list}"), usize::from(i) / 3, usize::from(i) % 3);
-        quote!(#list[#point][#axis])
+fn read_input(program: &Program, kind: RoutineKind, input: Input) -> TokenStream {
+    let coordinate = |points: &str, i: u16, numbers: &str| {
+        let i = usize::from(i);
+        if is_flat(program, kind) {
+            let numbers = format_ident!("{numbers}");
+            return quote!(#numbers[#i]);
+        }
+        let (points, point, axis) = (format_ident!("{points}"), i / 3, i % 3);
+        quote!(#points[#point][#axis])
     };
     match input {
-        Input::Position(i) if program.kind == Kind::Residual => {
-            let i = usize::from(i);
-            quote!(u[#i])
-        }
-        Input::Position(i) => coordinate("x", i),
-        Input::Velocity(i) => coordinate("v", i),
+        Input::Position(i) => coordinate("x", i, "u"),
+        Input::Velocity(i) => coordinate("v", i, "v"),
         Input::Parameter(i) => component(&program.parameters, usize::from(i), &quote!(self.)),
         Input::Precomputed(i) => {
             let i = usize::from(i);
             quote!(self.precomputed[#i])
         }
         Input::Rest(_) => unreachable!("compiler bug: the rest shape is read when an element is made"),
+        Input::Increment(_) => unreachable!("compiler bug: increments are 0, and nothing reads them"),
     }
 }
 

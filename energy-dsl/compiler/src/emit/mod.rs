@@ -3,6 +3,7 @@
 mod declaration;
 mod items;
 mod methods;
+mod mixed;
 mod repeated;
 mod spelling;
 mod statements;

@@ -4,7 +4,8 @@ use proc_macro2::TokenStream;
 use quote::quote;
 
 use super::Emitter;
-use super::methods::{array, implementation, vertices};
+use super::methods::{array, component, implementation, vertices};
+use super::mixed;
 use super::statements::arranged;
 use crate::graph::Input;
 use crate::plan::Shape;
@@ -12,16 +13,21 @@ use energy_runtime::{Kind, RoutineKind};
 
 /// Emits all traits of the declaration's kind.
 pub(super) fn traits(emitter: &Emitter<'_>) -> TokenStream {
-    match emitter.program.kind {
-        Kind::Energy => potential(emitter),
-        Kind::Force => force_law(emitter),
-        Kind::Constraint => {
+    let own = match (emitter.program.kind, emitter.program.is_mixed()) {
+        (Kind::Energy, false) => potential(emitter),
+        (Kind::Energy, true) => mixed::potential(emitter),
+        (Kind::Force, false) => force_law(emitter),
+        (Kind::Force, true) => mixed::force(emitter),
+        (Kind::Constraint, false) => {
             let (potential, force) = (potential(emitter), force_law(emitter));
             let constraint = constraint(emitter);
             quote!(#potential #force #constraint)
         }
-        Kind::Residual => residual(emitter),
-    }
+        (Kind::Constraint, true) => mixed::constraint(emitter),
+        (Kind::Residual, _) => residual(emitter),
+    };
+    let memory = if emitter.program.states > 0 { memory(emitter) } else { TokenStream::new() };
+    quote!(#own #memory)
 }
 
 fn potential(emitter: &Emitter<'_>) -> TokenStream {
@@ -111,7 +117,42 @@ fn constraint(emitter: &Emitter<'_>) -> TokenStream {
 
 fn residual(emitter: &Emitter<'_>) -> TokenStream {
     let (unknowns, rows) = (emitter.program.moving_size(), emitter.program.rows());
-    let [unknowns, rows, jacobian] = [unknowns, rows, rows * unknowns].map(|length| array(Shape::Numbers, length));
+    let increments = emitter.program.increments();
+    let [unknowns, rows, jacobian] = [unknowns, rows, rows * increments].map(|length| array(Shape::Numbers, length));
     let types = quote!(type Unknowns = #unknowns; type Rows = #rows; type Jacobian = #jacobian;);
     implementation(emitter, "Residual", &types, &[RoutineKind::Residual, RoutineKind::Jacobian])
+}
+
+/// Emits the traits of an element's state.
+fn memory(emitter: &Emitter<'_>) -> TokenStream {
+    let Emitter { program, plan, .. } = emitter;
+    let (size, increments) = (program.state_size(), program.increments());
+    let [unknowns, state, by_unknowns, by_state] =
+        [program.moving_size(), size, size * increments, size * size].map(|length| array(Shape::Numbers, length));
+    let own = program.parameters_size() - size;
+    let fields: Vec<TokenStream> =
+        (own..own + size).map(|number| component(&program.parameters, number, &quote!(self.))).collect();
+    let numbers = 0..size;
+    let types = quote! {
+        type Unknowns = #unknowns;
+        type State = #state;
+        type ByUnknowns = #by_unknowns;
+        type ByState = #by_state;
+
+        fn state(&self) -> #state {
+            [#(#fields),*]
+        }
+
+        fn set_state(&mut self, state: &#state) {
+            #(#fields = state[#numbers];)*
+        }
+    };
+    let next = implementation(emitter, "Stateful", &types, &[RoutineKind::Next, RoutineKind::NextJacobians]);
+    let sensitivity = plan.find(RoutineKind::StateJacobian).map(|routine| {
+        let rows = routine.sizes()[0];
+        let [slopes, by_state] = [rows, rows * size].map(|length| array(Shape::Numbers, length));
+        let types = quote!(type Slopes = #slopes; type SlopesByState = #by_state;);
+        implementation(emitter, "StateSensitivity", &types, &[RoutineKind::StateJacobian])
+    });
+    quote!(#next #sensitivity)
 }

@@ -333,6 +333,7 @@ impl Element<'_> {
             Input::Position(i) if self.plan.declaration.kind == Kind::Residual => format!("u[{i}]"),
             Input::Position(i) => format!("x[{i}]"),
             Input::Velocity(i) => format!("v[{i}]"),
+            Input::Increment(_) => unreachable!("compiler bug: increments are 0, and nothing reads them"),
             Input::Parameter(i) => format!("parameters[{i}]"),
             Input::Rest(i) => format!("rest[{i}]"),
             Input::Precomputed(i) => match (&self.plan.repetition, usize::from(i)) {

@@ -121,6 +121,9 @@ fn routine_docs(kind: RoutineKind) -> &'static str {
         RoutineKind::Residual => "The residual.",
         RoutineKind::Jacobian => "The residual and its Jacobian.",
         RoutineKind::Vertex(_) => "U, and its derivatives by one point alone.",
+        RoutineKind::Next => "The state after a step.",
+        RoutineKind::NextJacobians => "The state after a step and its derivatives.",
+        RoutineKind::StateJacobian => "The gradient and its derivatives by the state.",
     }
 }
 

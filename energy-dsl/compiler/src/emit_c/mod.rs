@@ -19,6 +19,7 @@ use std::fmt::Write as _;
 use crate::interpreted::Interpreted;
 use dialect::{Dialect, Numbers};
 use element::Element;
+use energy_runtime::{Field, FieldKind};
 use expression::Meanings;
 
 pub use dialect::Precision;
@@ -58,7 +59,15 @@ pub fn sources(
 ) -> Result<Vec<SourceFile>, SourceError> {
     let names: Vec<String> = elements.iter().map(|element| snake_case(&element.declaration().name)).collect();
     if let Some(place) = (1..names.len()).find(|&place| names[..place].contains(&names[place])) {
-        return Err(SourceError { name: names[place].clone() });
+        return Err(SourceError::SameName { name: names[place].clone() });
+    }
+    let beyond = |element: &&Interpreted| {
+        let declaration = element.declaration();
+        let turns = |field: &Field| field.kind == FieldKind::Rotation;
+        declaration.is_mixed() || !declaration.state.is_empty() || declaration.points.iter().any(turns)
+    };
+    if let Some(element) = elements.iter().find(beyond) {
+        return Err(SourceError::Unknowns { name: element.declaration().name.to_string() });
     }
     if target == Target::Warp {
         return Ok(vec![warp::module(elements, &names, precisions)]);
@@ -69,16 +78,31 @@ pub fn sources(
     Ok(files)
 }
 
-/// Two elements that have one name in C.
+/// Why declarations cannot be written in another language.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct SourceError {
-    /// The name.
-    pub name: String,
+#[non_exhaustive]
+pub enum SourceError {
+    /// Two elements have one name in C.
+    SameName {
+        /// The name.
+        name: String,
+    },
+    /// An element has unknowns that are not points of its own, or a state.
+    Unknowns {
+        /// Name of the element.
+        name: String,
+    },
 }
 
 impl std::fmt::Display for SourceError {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "two declarations are called `{}` in C; rename one of them", self.name)
+        match self {
+            Self::SameName { name } => write!(f, "two declarations are called `{name}` in C; rename one of them"),
+            Self::Unknowns { name } => write!(
+                f,
+                "`{name}` has unknowns other than points, or a state; these are written in Rust only. Leave it out"
+            ),
+        }
     }
 }
 

@@ -29,7 +29,7 @@ impl Graph {
             return id;
         }
         let varies = match op {
-            Op::Input(Input::Position(_) | Input::Velocity(_)) => true,
+            Op::Input(Input::Position(_) | Input::Velocity(_) | Input::Increment(_)) => true,
             Op::Input(input) => self.varied.contains(&input),
             _ => op.operands().any(|o| self.varies(o)),
         };

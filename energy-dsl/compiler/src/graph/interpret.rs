@@ -100,6 +100,7 @@ impl Interpreter {
 fn read<T: Number>(input: Input, inputs: &Inputs<'_, T>, precomputed: &[T]) -> T {
     match input {
         Input::Position(i) => inputs.positions[usize::from(i)].clone(),
+        Input::Increment(_) => T::from_f64(0.0),
         Input::Velocity(i) => inputs.velocities.get(usize::from(i)).cloned().unwrap_or_else(|| T::from_f64(0.0)),
         Input::Parameter(i) => inputs.parameters[usize::from(i)].clone(),
         Input::Rest(i) => inputs.rest[usize::from(i)].clone(),

@@ -93,6 +93,8 @@ pub enum Primitive {
     SingularValue(u8),
     /// A function of the singular values of F.
     Spectral,
+    /// A component of the quaternion exp(δ) q at δ = 0.
+    Turned(u8),
     /// A number y in place of its definition x, which has the same value. The arguments are y and x. If `slopes`, first
     /// derivatives are those of y, too.
     ComputedAs {
@@ -160,7 +162,11 @@ impl Primitive {
             Self::StretchTraceExcess => "tr S − 3 of a polar decomposition F = R S",
             Self::DistanceToRotation => "squared distance ‖F − R‖² to the rotation of F = R S",
             Self::SingularValue(_) | Self::Spectral => "functions of singular values",
-            Self::InnerProduct | Self::Partial { .. } | Self::SincSqrtSlope | Self::ComputedAs { .. } => return None,
+            Self::InnerProduct
+            | Self::Partial { .. }
+            | Self::SincSqrtSlope
+            | Self::ComputedAs { .. }
+            | Self::Turned(_) => return None,
         })
     }
 }
@@ -267,6 +273,13 @@ impl Graph {
         node
     }
 
+    /// Changes a rule that was just added.
+    pub(crate) fn change_rule(&mut self, node: NodeId, change: impl FnOnce(&mut Rule)) {
+        if let Op::Rule(id) = self.op(node) {
+            change(&mut self.rules[id as usize]);
+        }
+    }
+
     /// Creates x, computed as y; with its slopes, or its value only.
     pub(crate) fn compute_as(&mut self, x: NodeId, y: NodeId, slopes: bool) -> NodeId {
         let (one, zero) = (self.constant(1.0), self.constant(0.0));
@@ -289,6 +302,10 @@ impl Graph {
         let value = self.product(None, &rule.first[by]);
         let n = rule.arguments.len();
         let Some(second) = &rule.second else { return value };
+        if matches!(rule.primitive, Primitive::Turned(_)) {
+            // A rotation by δ after another one: not the second derivative of their sum.
+            return value;
+        }
         if self.rule(value).is_some() || !self.varies(value) {
             return value;
         }

@@ -26,6 +26,8 @@ use energy_runtime::{Inputs, Number};
 pub struct Textbook {
     program: Program,
     rows: Interpreter,
+    /// The state after a step.
+    next: Interpreter,
     /// The derivatives that the formula uses.
     derivatives: Vec<Derivative>,
     /// The rows, and all that is differentiated.
@@ -59,15 +61,17 @@ impl Textbook {
             Diagnostics::from(Diagnostic::new(&here, "expected a declaration, found none"))
         })?;
         let lowered = program.budget.within(|| lower_textbook(&program));
-        let TextbookFormula { formula, gradients } = lowered.map_err(|stop| program.stopped(stop))?;
+        let TextbookFormula { formula, next, gradients } = lowered.map_err(|stop| program.stopped(stop))?;
         let interpreter = |outputs: &[NodeId]| Interpreter::new(&formula.graph, outputs);
         let inner = gradients.iter().map(|(of, ..)| *of);
-        let everything: Vec<NodeId> = formula.outputs.iter().copied().chain(inner).collect();
+        let everything: Vec<NodeId> =
+            formula.outputs.iter().copied().chain(next.iter().copied()).chain(inner).collect();
         let derivative =
             |&(of, source, by): &(NodeId, Source, usize)| Derivative { of: interpreter(&[of]), source, by };
         let derivatives = gradients.iter().map(derivative).collect();
         let (rows, everything) = (interpreter(&formula.outputs), interpreter(&everything));
-        Ok(Self { program, rows, derivatives, everything })
+        let next = interpreter(&next);
+        Ok(Self { program, rows, next, derivatives, everything })
     }
 
     /// Returns the checked declaration.
@@ -91,12 +95,24 @@ impl Textbook {
     /// # Panics
     /// When an input slice is shorter than declared.
     pub fn evaluate<T: Number>(&self, inputs: &Inputs<'_, T>) -> Vec<T> {
+        self.run(&self.rows, inputs)
+    }
+
+    /// Evaluates the state after a step; nothing without a state.
+    ///
+    /// # Panics
+    /// When an input slice is shorter than declared.
+    pub fn evaluate_next<T: Number>(&self, inputs: &Inputs<'_, T>) -> Vec<T> {
+        self.run(&self.next, inputs)
+    }
+
+    fn run<T: Number>(&self, outputs: &Interpreter, inputs: &Inputs<'_, T>) -> Vec<T> {
         if self.derivatives.is_empty() {
-            return self.rows.evaluate(inputs, &[]);
+            return outputs.evaluate(inputs, &[]);
         }
         let inputs = TowerInputs::of(inputs);
-        let gradients = self.gradients(&self.rows, &inputs, 1);
-        let rows = self.rows.evaluate(&inputs.borrow(), &gradients);
+        let gradients = self.gradients(outputs, &inputs, 1);
+        let rows = outputs.evaluate(&inputs.borrow(), &gradients);
         rows.into_iter().map(Tower::into_plain).collect()
     }
 

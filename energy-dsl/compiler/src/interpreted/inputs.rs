@@ -14,7 +14,8 @@ use energy_runtime::{Float, Kind, RestError};
 pub enum InputKind {
     /// A point: three coordinates that derivatives are taken by.
     Point,
-    /// An unknown of a residual: derivatives are taken by its numbers.
+    /// Any other unknown, and all of those of a residual: derivatives are taken by its numbers, or by the three
+    /// increments of a rotation.
     Unknown,
     /// Part of the rest shape, read once when an element is made.
     Rest,
@@ -43,7 +44,8 @@ impl InputNumbers {
     }
 
     pub(super) fn of(program: &Program) -> Vec<Self> {
-        let moving = if program.kind == Kind::Residual { InputKind::Unknown } else { InputKind::Point };
+        let is_flat = program.kind == Kind::Residual || program.is_mixed();
+        let moving = if is_flat { InputKind::Unknown } else { InputKind::Point };
         let list = |kind: InputKind, inputs: &[Input]| {
             let one = |input: &Input| Self {
                 name: input.name.clone(),

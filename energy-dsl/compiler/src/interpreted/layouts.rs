@@ -7,13 +7,13 @@ use energy_runtime::{Declaration, Kind, triangle_index};
 pub struct Layouts {
     /// The first result: U.
     pub value: Vec<u16>,
-    /// The first three numbers per point: a force.
+    /// The first numbers, one per increment: a force.
     pub vectors: Vec<u16>,
-    /// Three numbers per point after one number: ∂U/∂x.
+    /// The numbers after the first, one per increment: ∂U/∂x.
     pub gradient: Vec<u16>,
     /// ∂²U/∂x², row by row.
     pub hessian: Vec<u16>,
-    /// The triangle of ∂²U/∂x², block by block.
+    /// The triangle of ∂²U/∂x², block by block, or row by row for mixed unknowns.
     pub triangle: Vec<u16>,
     /// ∂f/∂x and ∂f/∂v, row by row.
     pub force_jacobians: [Vec<u16>; 2],
@@ -25,8 +25,10 @@ pub struct Layouts {
 
 impl Layouts {
     pub(super) fn of(declaration: &Declaration) -> Self {
+        if declaration.is_mixed() {
+            return Self::of_mixed(declaration);
+        }
         let points = if declaration.kind == Kind::Residual { 0 } else { declaration.points.len() };
-        let coordinates: usize = declaration.points.iter().map(|field| field.size).sum();
         let (n, rows) = (3 * points, declaration.rows);
         let entries = || (0..n).flat_map(move |row| (0..n).map(move |column| (row, column)));
         let hessian = entries().map(|(row, column)| {
@@ -45,7 +47,24 @@ impl Layouts {
             triangle: indices(1 + n..1 + n + 9 * points * (points + 1) / 2),
             force_jacobians: [square(n), square(n + n * n)],
             rows: indices(0..rows),
-            jacobian: indices(rows..rows + rows * coordinates),
+            jacobian: indices(rows..rows + rows * declaration.increments()),
+        }
+    }
+
+    /// Returns the places of the flat results of mixed unknowns.
+    fn of_mixed(declaration: &Declaration) -> Self {
+        let (n, rows) = (declaration.increments(), declaration.rows);
+        let entries = (0..n).flat_map(move |row| (0..n).map(move |column| (row, column)));
+        let hessian = entries.map(|(i, j)| 1 + n + triangle_index(n, i.min(j), i.max(j)));
+        Self {
+            value: indices(0..1),
+            vectors: indices(0..n),
+            gradient: indices(1..1 + n),
+            hessian: indices(hessian),
+            triangle: indices(1 + n..1 + n + n * (n + 1) / 2),
+            force_jacobians: [n, n + n * n].map(|first| indices(first..first + n * n)),
+            rows: indices(0..rows),
+            jacobian: indices(rows..rows + rows * n),
         }
     }
 }

@@ -10,15 +10,19 @@ use crate::tape::tapes;
 use energy_runtime::RoutineKind;
 
 /// Routines that blocks are taken from.
-pub(super) const EVALUATED: [RoutineKind; 8] = [
+pub(super) const EVALUATED: [RoutineKind; 12] = [
     RoutineKind::Value,
     RoutineKind::Gradient,
+    RoutineKind::Hessian,
     RoutineKind::ReducedHessian,
     RoutineKind::Force,
     RoutineKind::Jacobians,
     RoutineKind::ConstraintJacobian,
     RoutineKind::Residual,
     RoutineKind::Jacobian,
+    RoutineKind::Next,
+    RoutineKind::NextJacobians,
+    RoutineKind::StateJacobian,
 ];
 
 impl Interpreted {

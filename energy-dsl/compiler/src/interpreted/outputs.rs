@@ -106,7 +106,16 @@ impl Interpreted {
 
     /// Collects the blocks of a kind from its routines.
     fn outputs<T: Number>(&self, run: &dyn Fn(RoutineKind) -> Results<T>) -> Outputs<T> {
-        let points = self.plan.declaration.points.len();
+        let declaration = &self.plan.declaration;
+        let (points, increments) = (declaration.points.len(), declaration.increments());
+        let symmetric = |triangle: &[T]| match declaration.is_mixed() {
+            true => full_upper(increments, triangle),
+            false => full_triangle(points, triangle),
+        };
+        let square = |square: &[T]| match declaration.is_mixed() {
+            true => square.to_vec(),
+            false => full_square(points, square),
+        };
         let (mut blocks, mut repeats) = (Vec::new(), Vec::new());
         let mut flags = [Flags::clear(), Flags::clear(), Flags::clear()];
         if matches!(self.plan.declaration.kind, Kind::Energy | Kind::Constraint) {
@@ -114,7 +123,7 @@ impl Interpreted {
             let (hessian, of_hessian) = run(RoutineKind::Hessian);
             blocks.push(("energy", value[0].clone()));
             blocks.push(("grad", gradient[1].clone()));
-            blocks.push(("hess", full_triangle(points, &hessian[2])));
+            blocks.push(("hess", symmetric(&hessian[2])));
             repeats.push(("gradient", "energy", gradient[0].clone()));
             repeats.push(("hessian", "energy", hessian[0].clone()));
             repeats.push(("hessian", "grad", hessian[1].clone()));
@@ -123,8 +132,8 @@ impl Interpreted {
         if matches!(self.plan.declaration.kind, Kind::Force | Kind::Constraint) {
             let ((force, of_force), (jacobians, of_jacobians)) = (run(RoutineKind::Force), run(RoutineKind::Jacobians));
             blocks.push(("force", force[0].clone()));
-            blocks.push(("dfdx", full_square(points, &jacobians[1])));
-            blocks.push(("dfdv", full_square(points, &jacobians[2])));
+            blocks.push(("dfdx", square(&jacobians[1])));
+            blocks.push(("dfdv", square(&jacobians[2])));
             repeats.push(("jacobians", "force", jacobians[0].clone()));
             if self.plan.declaration.kind == Kind::Force {
                 flags = [of_force, of_jacobians.clone(), of_jacobians];
@@ -143,6 +152,17 @@ impl Interpreted {
                 flags = [of_residual, of_jacobian, Flags::clear()];
             }
             Kind::Energy | Kind::Force => {}
+        }
+        if !declaration.state.is_empty() {
+            let ((next, _), (jacobians, _)) = (run(RoutineKind::Next), run(RoutineKind::NextJacobians));
+            blocks.push(("next", next[0].clone()));
+            blocks.push(("next_by_unknowns", jacobians[1].clone()));
+            blocks.push(("next_by_state", jacobians[2].clone()));
+            repeats.push(("next_jacobians", "next", jacobians[0].clone()));
+            if declaration.kind != Kind::Force {
+                let (slopes, _) = run(RoutineKind::StateJacobian);
+                blocks.push(("slopes_by_state", slopes[1].clone()));
+            }
         }
         Outputs { blocks, repeats, flags }
     }
@@ -196,6 +216,7 @@ fn read<T: Number>(
     let zero = || T::from_f64(0.0);
     let number = |input: &Input| match *input {
         Input::Position(i) => inputs.positions[usize::from(i)].clone(),
+        Input::Increment(_) => zero(),
         Input::Velocity(i) => inputs.velocities.get(usize::from(i)).cloned().unwrap_or_else(zero),
         Input::Parameter(i) => inputs.parameters[usize::from(i)].clone(),
         Input::Rest(i) => inputs.rest[usize::from(i)].clone(),
@@ -218,6 +239,12 @@ fn full_triangle<T: Number>(points: usize, triangle: &[T]) -> Vec<T> {
             triangle[9 * triangle_index(points, row / 3, column / 3) + row % 3 * 3 + column % 3].clone()
         })
         .collect()
+}
+
+/// Expands an upper triangle to a full matrix, row by row.
+fn full_upper<T: Number>(increments: usize, upper: &[T]) -> Vec<T> {
+    let entries = (0..increments).flat_map(|row| (0..increments).map(move |column| (row, column)));
+    entries.map(|(row, column)| upper[triangle_index(increments, row.min(column), row.max(column))].clone()).collect()
 }
 
 /// Expands a square of 3×3 blocks to a full matrix, row by row.

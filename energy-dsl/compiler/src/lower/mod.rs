@@ -15,7 +15,7 @@ use std::ops::Range;
 
 use crate::budget::{Budget, Phase};
 use crate::check::{Program, Source, Typed, TypedKind};
-use crate::diff::{Coordinates, Moving, Order, first_derivatives};
+use crate::diff::{Coordinates, Moving, Order, Unknown, Unknowns, by_increments, first_derivatives};
 use crate::functions::{Lowered, RECOGNISERS, Shape};
 use crate::graph::{Form, Graph, Input, NodeId, count, ordinary};
 use repeated::{LikeTerms, like_terms};
@@ -46,26 +46,53 @@ pub struct RestFormula {
 /// Sums of like terms become loops from this cost on. Below, unrolled terms share what they have in common.
 const LEAST_COST_OF_LOOPS: usize = 1000;
 
+/// What an element with memory needs beside its formula. States are inputs that derivatives can be taken with respect
+/// to.
+#[derive(Clone, Debug)]
+pub struct Memory {
+    /// The formula.
+    pub formula: Formula,
+    /// The state after a step.
+    pub next: Formula,
+}
+
+/// A program as graphs.
+#[derive(Clone, Debug)]
+pub struct LoweredProgram {
+    /// The part that the rest shape determines.
+    pub rest: RestFormula,
+    /// The part that moves.
+    pub formula: Formula,
+    /// The parts of an element with memory; `None` without a state.
+    pub memory: Option<Memory>,
+}
+
 /// Lowers to the robust form, split into the part that the rest shape determines and the part that moves.
 #[must_use]
-pub fn lower(program: &Program) -> (RestFormula, Formula) {
+pub fn lower(program: &Program) -> LoweredProgram {
     program.budget.enter(Phase::Lowering);
     let declared = stored_bindings(program);
     let program = &rest::with_constant_parts_stored(program);
     let mut rest = Lowering::new(program, Form::Robust, None);
     declared.into_iter().for_each(|binding| drop(rest.binding(binding)));
     let determinants = rest.graph.determinants().to_vec();
-    let (outputs, formula) = like_terms(program)
+    // The loop of a sum has no place for the state after a step.
+    let (outputs, formula, memory) = like_terms(program)
+        .filter(|_| program.next.is_none())
         .map(|terms| repeated(&terms, &mut rest))
         .filter(|(_, formula)| formula.cost() >= LEAST_COST_OF_LOOPS)
-        .unwrap_or_else(|| unrolled(program, &mut rest));
-    (RestFormula { graph: rest.graph, outputs, determinants }, formula)
+        .map_or_else(|| unrolled(program, &mut rest), |(outputs, formula)| (outputs, formula, None));
+    LoweredProgram { rest: RestFormula { graph: rest.graph, outputs, determinants }, formula, memory }
 }
 
-/// Returns the numbers to store, and the formula.
-fn unrolled(program: &Program, rest: &mut Lowering<'_>) -> (Vec<NodeId>, Formula) {
+/// Returns the numbers to store, and the formulas.
+fn unrolled(program: &Program, rest: &mut Lowering<'_>) -> (Vec<NodeId>, Formula, Option<Memory>) {
     let (outputs, slots) = stored(rest, stored_bindings(program));
-    (outputs, moving(program, &slots))
+    let memory = program.next.as_ref().map(|next| Memory {
+        formula: moving(program, &program.result, &slots, true),
+        next: moving(program, next, &slots, true),
+    });
+    (outputs, moving(program, &program.result, &slots, false), memory)
 }
 
 /// Returns the numbers of bindings, and the place of each binding among them.
@@ -98,15 +125,21 @@ fn repeated(sum: &LikeTerms, rest: &mut Lowering<'_>) -> (Vec<NodeId>, Formula) 
     }
     let row = |number: usize| constants.iter().flat_map(|(_, rows)| rows[number].clone()).collect();
     let table = (0..*terms).map(row).collect();
-    (outputs, Formula { repetition: Some(Repetition { shared, stride, table }), ..moving(term, &slots) })
+    (
+        outputs,
+        Formula { repetition: Some(Repetition { shared, stride, table }), ..moving(term, &term.result, &slots, false) },
+    )
 }
 
 /// Lowers what moves. Powers of two that move outwards may meet and cancel, but may also be multiplied more often.
-fn moving(program: &Program, slots: &BTreeMap<usize, usize>) -> Formula {
+fn moving(program: &Program, result: &Typed, slots: &BTreeMap<usize, usize>, states_vary: bool) -> Formula {
     let formula = |outward: bool| {
         let mut moving = Lowering::new(program, Form::Robust, Some(slots.clone()));
+        if states_vary {
+            moving.vary_states();
+        }
         moving.graph.move_outward(outward);
-        let mut outputs = moving.expression(&program.result).parts;
+        let mut outputs = moving.expression(result).parts;
         moving.spectral.close(&mut moving.graph, &mut outputs);
         moving.graph.move_outward(false);
         Formula { graph: moving.graph, outputs, repetition: None }
@@ -129,6 +162,8 @@ impl Formula {
 pub struct TextbookFormula {
     /// The formula, as a graph. The derivatives that it uses are [`Input::Precomputed`].
     pub formula: Formula,
+    /// The state after a step, in the same graph; empty without a state.
+    pub next: Vec<NodeId>,
     /// Derivatives that the formula uses: node, section and index of the input number. Later ones may use earlier ones.
     pub gradients: Vec<(NodeId, Source, usize)>,
 }
@@ -138,8 +173,10 @@ pub struct TextbookFormula {
 pub fn lower_textbook(program: &Program) -> TextbookFormula {
     let mut lowering = Lowering::new(program, Form::Textbook, None);
     let outputs = lowering.expression(&program.result).parts;
+    let next = program.next.as_ref().map_or_else(Vec::new, |next| lowering.expression(next).parts);
     TextbookFormula {
         formula: Formula { graph: lowering.graph, outputs, repetition: None },
+        next,
         gradients: lowering.gradients,
     }
 }
@@ -157,12 +194,13 @@ fn stored_bindings(program: &Program) -> Vec<usize> {
         }
     }
     let mut seen = vec![false; program.bindings.len()];
-    visit(program, &program.result, &mut seen);
+    std::iter::once(&program.result).chain(&program.next).for_each(|result| visit(program, result, &mut seen));
     (0..seen.len()).filter(|&b| seen[b] && program.bindings[b].rest).collect()
 }
 
 struct Lowering<'a> {
     program: &'a Program,
+    unknowns: Unknowns,
     graph: Graph,
     done: BTreeMap<usize, Lowered>,
     /// Index of each stored binding; `None` if bindings are computed here.
@@ -185,12 +223,21 @@ impl<'a> Lowering<'a> {
         differentiated_parameters(program).into_iter().for_each(|number| graph.vary(Input::Parameter(number)));
         Self {
             program,
+            unknowns: Unknowns::of(&program.moving),
             graph,
             done: BTreeMap::new(),
             slots,
             gradients: Vec::new(),
             spectral: Spectral::default(),
             nested: 0,
+        }
+    }
+
+    /// Makes the state an input that derivatives can be taken with respect to.
+    fn vary_states(&mut self) {
+        for state in self.program.state() {
+            let numbers = state.first..state.first + state.input_type.size();
+            numbers.for_each(|number| self.graph.vary(Input::Parameter(Budget::input_number(number))));
         }
     }
 
@@ -250,7 +297,17 @@ impl<'a> Lowering<'a> {
         match &expression.kind {
             TypedKind::Constant(value) => Lowered::scalar(self.graph.constant(*value)),
             TypedKind::Pi => Lowered::scalar(self.graph.pi()),
-            TypedKind::Input(source, first) => self.inputs(expression.shape, *first, input_of(*source)),
+            TypedKind::Input(source, first) => {
+                let rotation = match (source, self.graph.form()) {
+                    // Derivatives are by its increments. Whoever evaluates the textbook form moves it otherwise.
+                    (Source::Position, Form::Robust) => self.unknowns.rotation(&mut self.graph, *first),
+                    _ => None,
+                };
+                match rotation {
+                    Some(parts) => Lowered { shape: expression.shape, parts },
+                    None => self.inputs(expression.shape, *first, input_of(*source)),
+                }
+            }
             TypedKind::Binding(number) => self.binding(*number),
             TypedKind::Call(function, arguments) => {
                 let mut arguments: Vec<_> = arguments.iter().map(|a| self.expression(a)).collect();
@@ -273,9 +330,14 @@ impl<'a> Lowering<'a> {
                 let mut of = [self.expression(of).node()];
                 self.spectral.close(&mut self.graph, &mut of);
                 let ([of], shape) = (of, expression.shape);
+                let is_turned = *source == Source::Position && self.unknowns.is_rotation(*first);
                 let parts = match (self.graph.form(), source) {
+                    (Form::Textbook, _) if is_turned => {
+                        let by_numbers = self.textbook_gradient(of, *source, *first..*first + 4);
+                        by_increments(&mut self.graph, *first, &by_numbers)
+                    }
                     (Form::Textbook, _) => self.textbook_gradient(of, *source, *first..*first + shape.size()),
-                    (Form::Robust, Source::Position) => self.gradient_by_point(of, first / 3),
+                    (Form::Robust, Source::Position) => self.gradient_by_unknown(of, *first),
                     (Form::Robust, _) => self.gradient_by_parameter(of, *first, shape),
                 };
                 Lowered { shape, parts }
@@ -296,11 +358,13 @@ impl<'a> Lowering<'a> {
         numbers.map(derivative).collect()
     }
 
-    fn gradient_by_point(&mut self, of: NodeId, point: usize) -> Vec<NodeId> {
+    fn gradient_by_unknown(&mut self, of: NodeId, first: usize) -> Vec<NodeId> {
         let g = &mut self.graph;
-        let coordinates = Coordinates::of_points(g, &[of], Moving::Positions);
+        let coordinates = Coordinates::reduced(g, &[of], &self.unknowns, Moving::Unknowns);
         let reduced = first_derivatives(g, &[of], &coordinates, Order::FirstToDifferentiate).remove(0);
-        coordinates.expand(g, &reduced, point)
+        let is_it = |unknown: &Unknown| unknown.first_number == first;
+        let unknown = self.unknowns.list.iter().position(is_it).expect("compiler bug: a gradient by no unknown");
+        coordinates.expand(g, &reduced, unknown)
     }
 
     fn gradient_by_parameter(&mut self, of: NodeId, first: usize, shape: Shape) -> Vec<NodeId> {
@@ -336,6 +400,7 @@ fn differentiated_parameters(program: &Program) -> BTreeSet<u16> {
         .iter()
         .map(|binding| &binding.value)
         .chain([&program.result])
+        .chain(&program.next)
         .for_each(|t| visit(program, t, &mut found));
     found
 }

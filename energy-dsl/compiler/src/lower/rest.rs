@@ -25,13 +25,15 @@ pub(super) fn with_constant_parts_stored(program: &Program) -> Program {
         stored.bindings[number].value = split.expression(&binding.value);
     }
     stored.result = split.expression(&program.result);
+    stored.next = program.next.as_ref().map(|next| split.expression(next));
     let mut mover = Mover::new(&stored);
     let values: Vec<_> =
         moving().map(|(number, _)| (number, mover.expression(&stored.bindings[number].value))).collect();
     let result = mover.expression(&stored.result);
+    let next = stored.next.as_ref().map(|next| mover.expression(next));
     let moved = mover.moved;
     values.into_iter().for_each(|(number, value)| stored.bindings[number].value = value);
-    stored.result = result;
+    (stored.result, stored.next) = (result, next);
     stored.bindings.extend(moved);
     stored
 }

@@ -67,10 +67,13 @@ fn character(program: &Program, routines: &Routines) -> Character {
     let group = |kind: RoutineKind, number: usize| routines.find(kind)?.groups.get(number);
     let varies = |nodes: Option<&Vec<NodeId>>| nodes.is_some_and(|n| n.iter().any(|&e| !routines.graph.is(e, 0.0)));
     let (by_position, by_velocity) = (group(RoutineKind::Jacobians, 1), group(RoutineKind::Jacobians, 2));
-    let n = program.points();
+    let (n, size) = (program.points(), program.increments());
     let mirrored = |square: &Vec<NodeId>| {
-        let entry = |row: usize, column: usize| square[9 * (row / 3 * n + column / 3) + 3 * (row % 3) + column % 3];
-        (0..3 * n).all(|row| (0..row).all(|column| entry(row, column) == entry(column, row)))
+        let entry = |row: usize, column: usize| match program.is_mixed() {
+            true => square[row * size + column],
+            false => square[9 * (row / 3 * n + column / 3) + 3 * (row % 3) + column % 3],
+        };
+        (0..size).all(|row| (0..row).all(|column| entry(row, column) == entry(column, row)))
     };
     let constant = |nodes: &Vec<NodeId>| nodes.iter().all(|&entry| !routines.graph.varies(entry));
     Character {

@@ -15,7 +15,17 @@ pub(crate) enum Shape {
     Blocks,
 }
 
-/// Returns name and shape of each group that a routine computes.
+impl Shape {
+    /// Returns the shape for mixed unknowns, which are flat.
+    pub(crate) const fn flat(self) -> Self {
+        match self {
+            Self::Number => Self::Number,
+            Self::Numbers | Self::Vectors | Self::Blocks => Self::Numbers,
+        }
+    }
+}
+
+/// Returns name and shape of each group that a routine computes. For mixed unknowns, all but single numbers are flat.
 pub(crate) const fn groups(kind: RoutineKind) -> &'static [(&'static str, Shape)] {
     use Shape::{Blocks, Number, Numbers, Vectors};
     match kind {
@@ -33,6 +43,9 @@ pub(crate) const fn groups(kind: RoutineKind) -> &'static [(&'static str, Shape)
         RoutineKind::ConstraintHessian => &[("value", Numbers), ("jacobian", Vectors), ("hessians", Blocks)],
         RoutineKind::Residual => &[("value", Numbers)],
         RoutineKind::Jacobian => &[("value", Numbers), ("jacobian", Numbers)],
+        RoutineKind::Next => &[("state", Numbers)],
+        RoutineKind::NextJacobians => &[("state", Numbers), ("by_unknowns", Numbers), ("by_state", Numbers)],
+        RoutineKind::StateJacobian => &[("gradient", Numbers), ("by_state", Numbers)],
         RoutineKind::Vertex(_) => &[("value", Number), ("gradient", Numbers), ("block", Vectors)],
     }
 }

@@ -2,8 +2,8 @@
 
 use super::{Hazards, Whole, hazards, potential};
 use crate::check::Program;
-use crate::diff::{Coordinates, Routes, SecondOrder, first_order, second_order};
-use crate::graph::{Graph, Input, NodeId, symmetric_index};
+use crate::diff::{Coordinates, Routes, SecondOrder, Unknowns, first_order, second_order};
+use crate::graph::{Graph, Input, NodeId};
 use energy_runtime::RoutineKind;
 
 /// The shared parts of all routines, in reduced coordinates.
@@ -19,25 +19,34 @@ struct Compliant<'a> {
     stiffness: NodeId,
     damping: NodeId,
     coordinates: &'a Coordinates,
-    points: usize,
+    unknowns: &'a Unknowns,
+    is_mixed: bool,
+}
+
+/// Returns the stiffness (2 from the end) or the damping (1) of a constraint.
+fn implied(g: &mut Graph, program: &Program, from_end: usize) -> NodeId {
+    let number = program.parameters_size() - program.state_size() - from_end;
+    g.input(Input::Parameter(u16::try_from(number).expect("few parameters")))
+}
+
+/// Returns ½ k_s CᵀC.
+pub(super) fn energy(g: &mut Graph, program: &Program, c: &[NodeId]) -> NodeId {
+    let stiffness = implied(g, program, 2);
+    let square = g.sum_of_squares(c);
+    let half = g.constant(0.5);
+    let scaled = g.mul(half, square);
+    g.mul(stiffness, scaled)
 }
 
 pub(super) fn routines(
     g: &mut Graph,
     program: &Program,
     c: &[NodeId],
-    coordinates: &Coordinates,
+    (unknowns, coordinates): (&Unknowns, &Coordinates),
     routes: &mut Vec<Routes>,
 ) -> (Vec<Whole>, SecondOrder) {
-    let parameter = |g: &mut Graph, from_end: usize| {
-        let number = program.parameters_size() - from_end;
-        g.input(Input::Parameter(u16::try_from(number).expect("few parameters")))
-    };
-    let (stiffness, damping) = (parameter(g, 2), parameter(g, 1));
-    let square = g.sum_of_squares(c);
-    let half = g.constant(0.5);
-    let scaled = g.mul(half, square);
-    let value = g.mul(stiffness, scaled);
+    let (stiffness, damping) = (implied(g, program, 2), implied(g, program, 1));
+    let value = energy(g, program, c);
     let (energy, taken) = second_order(g, RoutineKind::Hessian.name(), value, coordinates);
     routes.push(taken);
     let (jacobian, taken) = first_order(g, RoutineKind::ConstraintJacobian.name(), c, coordinates, None);
@@ -59,9 +68,10 @@ pub(super) fn routines(
         stiffness,
         damping,
         coordinates,
-        points: program.points(),
+        unknowns,
+        is_mixed: program.is_mixed(),
     };
-    let mut list = potential(g, &compliant.energy, coordinates, compliant.points, routes);
+    let mut list = potential(g, &compliant.energy, coordinates, compliant.is_mixed, routes);
     list.extend(compliant.geometry(g));
     list.push(compliant.gauss_newton(g));
     list.extend(compliant.force(g));
@@ -82,9 +92,9 @@ impl Compliant<'_> {
         let (first, second) = (hazards(g, &rows(1)), hazards(g, &rows(2)));
         let (c, jacobian, hessians) = (self.c.to_vec(), self.jacobian.concat(), self.hessians.concat());
         let full_jacobian: Vec<NodeId> =
-            self.jacobian.iter().flat_map(|row| self.coordinates.expand_all(g, row, self.points)).collect();
+            self.jacobian.iter().flat_map(|row| self.coordinates.expand_all(g, row)).collect();
         let full_hessians: Vec<NodeId> =
-            self.hessians.iter().flat_map(|row| self.coordinates.expand_triangle(g, row, self.points)).collect();
+            self.hessians.iter().flat_map(|row| self.coordinates.expand_symmetric(g, row, self.is_mixed)).collect();
         [
             Whole::new(
                 RoutineKind::ConstraintJacobian,
@@ -114,8 +124,8 @@ impl Compliant<'_> {
         let upper = (0..n).flat_map(|i| (i..n).map(move |j| (i, j)));
         let curvature: Vec<NodeId> = upper.map(|(i, j)| self.outer(g, self.stiffness, i, j)).collect();
         let value = self.energy.value;
-        let full_gradient = self.coordinates.expand_all(g, &self.gradient, self.points);
-        let full_curvature = self.coordinates.expand_triangle(g, &curvature, self.points);
+        let full_gradient = self.coordinates.expand_all(g, &self.gradient);
+        let full_curvature = self.coordinates.expand_symmetric(g, &curvature, self.is_mixed);
         let hazards = self.hazards(g, 1, 1);
         Whole::new(
             RoutineKind::GaussNewton,
@@ -141,23 +151,28 @@ impl Compliant<'_> {
             })
             .collect();
 
-        let entry = |list: &[NodeId], i: usize, j: usize| list[symmetric_index(n, i, j)];
-        // k_d ∂²C q̇ for each row.
-        let turning: Vec<Vec<NodeId>> = self
+        let energy = self.coordinates.plain(g, self.unknowns, &self.energy.hessian, &self.energy.gradient);
+        let rows: Vec<Vec<NodeId>> = self
             .hessians
             .iter()
+            .zip(&self.jacobian)
+            .map(|(hessian, slopes)| self.coordinates.plain(g, self.unknowns, hessian, slopes))
+            .collect();
+        // k_d (∂J/∂x)ᵀ q̇ for each row.
+        let turning: Vec<Vec<NodeId>> = rows
+            .iter()
             .map(|h| {
-                let row = |i: usize| (0..n).map(|j| entry(h, i, j)).collect::<Vec<_>>();
-                let rates: Vec<NodeId> = (0..n).map(|i| g.dot(&row(i), &speeds)).collect();
+                let column = |j: usize| (0..n).map(|i| h[i * n + j]).collect::<Vec<_>>();
+                let rates: Vec<NodeId> = (0..n).map(|j| g.dot(&column(j), &speeds)).collect();
                 g.scaled(self.damping, &rates)
             })
             .collect();
         let mut by_position = Vec::with_capacity(n * n);
         let mut by_velocity = Vec::with_capacity(n * n);
         for (i, j) in (0..n).flat_map(|i| (0..n).map(move |j| (i, j))) {
-            let mut sum = entry(&self.energy.hessian, i, j);
-            for (row, h) in self.hessians.iter().enumerate() {
-                let bending = g.mul(damped_rates[row], entry(h, i, j));
+            let mut sum = energy[i * n + j];
+            for (row, h) in rows.iter().enumerate() {
+                let bending = g.mul(damped_rates[row], h[i * n + j]);
                 let swinging = g.mul(self.jacobian[row][i], turning[row][j]);
                 sum = g.add(sum, bending);
                 sum = g.add(sum, swinging);
@@ -167,9 +182,9 @@ impl Compliant<'_> {
             by_velocity.push(g.neg(resisting));
         }
 
-        let full_force = self.coordinates.expand_all(g, &force, self.points);
-        let full_position = self.coordinates.expand_square(g, &by_position, self.points);
-        let full_velocity = self.coordinates.expand_square(g, &by_velocity, self.points);
+        let full_force = self.coordinates.expand_all(g, &force);
+        let full_position = self.coordinates.expand_matrix(g, &by_position, self.is_mixed);
+        let full_velocity = self.coordinates.expand_matrix(g, &by_velocity, self.is_mixed);
         let hazards = [(1, 1), (2, 2)].map(|(energy, rows)| self.hazards(g, energy, rows));
         [
             Whole::new(RoutineKind::Force, force.clone(), vec![full_force.clone()], hazards[0]),

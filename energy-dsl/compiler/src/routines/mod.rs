@@ -4,15 +4,18 @@ mod constraint;
 mod domain;
 mod hazards;
 mod magnitude;
+mod memory;
 mod range;
 
 use rustc_hash::FxHashMap;
 
 use crate::budget::{Budget, Phase};
 use crate::check::Program;
-use crate::diff::{Coordinates, Moving, Routes, SecondOrder, first_order, hessian_vector, only_dihedral, second_order};
+use crate::diff::{
+    Coordinates, Moving, Routes, SecondOrder, Unknowns, first_order, hessian_vector, only_dihedral, second_order,
+};
 use crate::graph::{Graph, Input, NodeId, Op, count, general, ordinary, with_signs_inside};
-use crate::lower::{Formula, Repetition, RestFormula};
+use crate::lower::{Formula, LoweredProgram, Repetition, RestFormula};
 use energy_runtime::{Flag, Kind, OperationCount, RoutineKind};
 use hazards::{Hazards, hazards, operations};
 use range::Tests;
@@ -158,7 +161,7 @@ pub struct Routines {
     pub list: Vec<Routine>,
     /// Number of reduced coordinates.
     pub coordinates: usize,
-    /// Points of each coordinate vector, with weights; empty for residuals.
+    /// Points of each coordinate vector, with weights; empty for residuals and mixed unknowns.
     pub vectors: Vec<Vec<(usize, f64)>>,
     /// Expansion of the derivatives of an energy to points.
     pub expansion: Option<Expansion>,
@@ -170,8 +173,8 @@ pub struct Routines {
     pub primitives: Vec<&'static str>,
     /// Routes to the derivatives of each routine.
     pub routes: Vec<Routes>,
-    /// The routines of single vertices; `None` if they are not wanted.
-    pub vertices: Option<Vertices>,
+    /// Routines that have graphs of their own: those of single vertices, and those of the state.
+    pub apart: Vec<Apart>,
 }
 
 impl Routines {
@@ -184,8 +187,8 @@ impl Routines {
     /// Returns all routines, each with its graph.
     pub fn all(&self) -> impl Iterator<Item = (&Graph, &Routine)> {
         let own = self.list.iter().map(|routine| (&self.graph, routine));
-        let of_vertices = self.vertices.iter().flat_map(|all| all.list.iter().map(|routine| (&all.graph, routine)));
-        own.chain(of_vertices)
+        let apart = self.apart.iter().flat_map(|all| all.list.iter().map(|routine| (&all.graph, routine)));
+        own.chain(apart)
     }
 
     /// Counts the operations that compute some outputs, in all terms of a sum.
@@ -211,7 +214,7 @@ impl Expansion {
     /// Creates the expansion. Derivatives that are constant or equal in the reduced gradient are so here. Entries of
     /// the reduced Hessian are not, unless all are 0: a projection to a semi-definite matrix may change them in
     /// between.
-    fn new(g: &Graph, energy: &SecondOrder, coordinates: &Coordinates, points: usize) -> Self {
+    fn new(g: &Graph, energy: &SecondOrder, coordinates: &Coordinates) -> Self {
         let mut graph = Graph::textbook().paid_by(g.budget());
         let all: Vec<NodeId> = energy.gradient.iter().chain(&energy.hessian).map(|&node| g.resolve(node)).collect();
         let projected = match all[energy.gradient.len()..].iter().all(|&entry| g.is(entry, 0.0)) {
@@ -231,8 +234,8 @@ impl Expansion {
             })
             .collect();
         let (gradient, triangle) = numbers.split_at(energy.gradient.len());
-        let gradient = coordinates.expand_all(&mut graph, gradient, points);
-        let triangle = coordinates.expand_triangle(&mut graph, triangle, points);
+        let gradient = coordinates.expand_all(&mut graph, gradient);
+        let triangle = coordinates.expand_symmetric(&mut graph, triangle, false);
         Self { graph, gradient, triangle }
     }
 }
@@ -241,14 +244,15 @@ impl Expansion {
 #[must_use]
 pub fn differentiate(
     program: &Program,
-    (mut rest, Formula { mut graph, outputs, repetition }): (RestFormula, Formula),
+    LoweredProgram { mut rest, formula: Formula { mut graph, outputs, repetition }, memory }: LoweredProgram,
 ) -> Routines {
     program.budget.enter(Phase::Differentiating);
     let refused = refused(&mut rest);
     let g = &mut graph;
+    let (unknowns, is_mixed) = (Unknowns::of(&program.moving), program.is_mixed());
     let coordinates = match program.kind {
-        Kind::Residual => Coordinates::of_unknowns(g, program.moving_size()),
-        _ => Coordinates::of_points(g, &outputs, Moving::Positions),
+        Kind::Residual => Coordinates::of_unknowns(g, &unknowns),
+        _ => Coordinates::reduced(g, &outputs, &unknowns, Moving::Unknowns),
     };
     let mut routes = Vec::new();
     let (mut expansion, mut dihedral) = (None, None);
@@ -256,38 +260,54 @@ pub fn differentiate(
         Kind::Energy => {
             let (energy, taken) = second_order(g, RoutineKind::Hessian.name(), outputs[0], &coordinates);
             routes.push(taken);
-            expansion = Some(Expansion::new(g, &energy, &coordinates, program.points()));
-            dihedral = only_dihedral(g, energy.value, &coordinates);
-            potential(g, &energy, &coordinates, program.points(), &mut routes)
+            (expansion, dihedral) = of_points(g, &energy, &coordinates, is_mixed);
+            potential(g, &energy, &coordinates, is_mixed, &mut routes)
         }
         Kind::Constraint => {
-            let (list, energy) = constraint::routines(g, program, &outputs, &coordinates, &mut routes);
-            expansion = Some(Expansion::new(g, &energy, &coordinates, program.points()));
-            dihedral = only_dihedral(g, energy.value, &coordinates);
+            let (list, energy) = constraint::routines(g, program, &outputs, (&unknowns, &coordinates), &mut routes);
+            (expansion, dihedral) = of_points(g, &energy, &coordinates, is_mixed);
             list
         }
-        Kind::Force => force(g, &outputs, &coordinates, program.points(), &mut routes),
+        Kind::Force => force(g, &outputs, &coordinates, (&unknowns, is_mixed), &mut routes),
         Kind::Residual => residual(g, &outputs, &coordinates, &mut routes),
     };
     let primitives = primitives(g, &outputs, &list);
-    let vertices =
-        program.vertices.then(|| Vertices::new(g, list[0].groups[0][0], &coordinates, program.points(), &mut routes));
+    let mut apart = Vec::new();
+    if program.vertices && !is_mixed {
+        apart.push(Apart::of_vertices(g, list[0].groups[0][0], &coordinates, program.points(), &mut routes));
+    }
+    if let Some(memory) = memory {
+        apart.extend(memory::routines(program, &unknowns, memory, &mut routes));
+    }
     let list = list.into_iter().map(|whole| whole.split(g)).collect();
     Routines {
         rest,
         refused,
         list,
         coordinates: coordinates.len(),
-        vectors: if program.kind == Kind::Residual { Vec::new() } else { coordinates.vectors.clone() },
+        vectors: if program.kind == Kind::Residual || is_mixed { Vec::new() } else { coordinates.vectors.clone() },
         expansion,
         dihedral,
         translation_invariant: coordinates.translation_invariant,
         primitives,
         routes,
-        vertices,
+        apart,
         graph,
         repetition,
     }
+}
+
+/// Returns what only energies of points have: the expansion from reduced coordinates, and the points of a dihedral angle.
+fn of_points(
+    g: &Graph,
+    energy: &SecondOrder,
+    coordinates: &Coordinates,
+    is_mixed: bool,
+) -> (Option<Expansion>, Option<[usize; 4]>) {
+    if is_mixed {
+        return (None, None);
+    }
+    (Some(Expansion::new(g, energy, coordinates)), only_dihedral(g, energy.value, coordinates))
 }
 
 /// Creates value, gradient and Hessian of U.
@@ -295,7 +315,7 @@ fn potential(
     g: &mut Graph,
     energy: &SecondOrder,
     coordinates: &Coordinates,
-    points: usize,
+    is_mixed: bool,
     routes: &mut Vec<Routes>,
 ) -> Vec<Whole> {
     let value = energy.value;
@@ -305,14 +325,14 @@ fn potential(
     let gradient = gradient.remove(0);
     let (product, taken) = hessian_vector(g, RoutineKind::HessianVector.name(), energy, coordinates);
     routes.push(taken);
-    let full_product = coordinates.expand_all(g, &product, points);
+    let full_product = coordinates.expand_all(g, &product);
     let hazards = [0, 1, 2].map(|order| hazards(g, &[(value, order)]));
-    let full_gradient = coordinates.expand_all(g, &gradient, points);
-    let hessian_gradient = coordinates.expand_all(g, &energy.gradient, points);
-    let triangle = coordinates.expand_triangle(g, &energy.hessian, points);
+    let full_gradient = coordinates.expand_all(g, &gradient);
+    let hessian_gradient = coordinates.expand_all(g, &energy.gradient);
+    let triangle = coordinates.expand_symmetric(g, &energy.hessian, is_mixed);
     let reduced = [&[value], &energy.gradient[..], &energy.hessian[..]].concat();
     let reduced_groups = vec![vec![value], energy.gradient.clone(), energy.hessian.clone()];
-    vec![
+    let mut list = vec![
         Whole::new(RoutineKind::Value, vec![value], vec![vec![value]], hazards[0]),
         Whole::new(
             RoutineKind::Gradient,
@@ -321,27 +341,40 @@ fn potential(
             hazards[1],
         ),
         Whole::new(RoutineKind::Hessian, reduced.clone(), vec![vec![value], hessian_gradient, triangle], hazards[2]),
-        Whole::new(RoutineKind::ReducedHessian, reduced, reduced_groups, hazards[2]),
-        Whole::new(RoutineKind::HessianVector, product, vec![full_product], hazards[2]),
-    ]
+    ];
+    if !is_mixed {
+        list.push(Whole::new(RoutineKind::ReducedHessian, reduced, reduced_groups, hazards[2]));
+    }
+    list.push(Whole::new(RoutineKind::HessianVector, product, vec![full_product], hazards[2]));
+    list
 }
 
-/// The value and its derivatives by each point alone. They have a graph of their own: a number that they, too, would use
-/// might round otherwise in the other routines.
+/// Routines with a graph of their own: a number that they, too, would use might round otherwise in the other routines.
 #[derive(Clone, Debug)]
-pub struct Vertices {
+pub struct Apart {
     /// The graph.
     pub graph: Graph,
-    /// One routine for each point.
+    /// The routines.
     pub list: Vec<Routine>,
 }
 
-impl Vertices {
-    fn new(graph: &Graph, value: NodeId, coordinates: &Coordinates, points: usize, routes: &mut Vec<Routes>) -> Self {
-        let mut graph = graph.clone();
-        let list = vertices(&mut graph, value, coordinates, points, routes);
+impl Apart {
+    fn new(mut graph: Graph, list: Vec<Whole>) -> Self {
         let list = list.into_iter().map(|whole| whole.split(&mut graph)).collect();
         Self { graph, list }
+    }
+
+    /// Creates the value and its derivatives by each point alone.
+    fn of_vertices(
+        graph: &Graph,
+        value: NodeId,
+        coordinates: &Coordinates,
+        points: usize,
+        routes: &mut Vec<Routes>,
+    ) -> Self {
+        let mut graph = graph.clone();
+        let list = vertices(&mut graph, value, coordinates, points, routes);
+        Self::new(graph, list)
     }
 }
 
@@ -370,26 +403,18 @@ fn force(
     g: &mut Graph,
     f: &[NodeId],
     coordinates: &Coordinates,
-    points: usize,
+    (unknowns, is_mixed): (&Unknowns, bool),
     routes: &mut Vec<Routes>,
 ) -> Vec<Whole> {
     let (by_position, taken) = first_order(g, RoutineKind::Jacobians.name(), f, coordinates, None);
     routes.push(taken);
-    let velocities = Coordinates::of_points(g, f, Moving::Velocities);
+    let velocities = Coordinates::reduced(g, f, unknowns, Moving::Velocities);
     let (by_velocity, taken) = first_order(g, "jacobians, by velocity", f, &velocities, None);
     routes.push(taken);
     let reduced = f.iter().copied().chain(by_position.iter().chain(&by_velocity).flatten().copied()).collect();
     let square = |g: &mut Graph, rows: &[Vec<NodeId>], coordinates: &Coordinates| {
-        let expanded: Vec<Vec<NodeId>> = rows.iter().map(|row| coordinates.expand_all(g, row, points)).collect();
-        let mut blocks = Vec::with_capacity(9 * points * points);
-        for i in 0..points {
-            for j in 0..points {
-                for row in 0..3 {
-                    blocks.extend_from_slice(&expanded[3 * i + row][3 * j..3 * j + 3]);
-                }
-            }
-        }
-        blocks
+        let expanded: Vec<Vec<NodeId>> = rows.iter().map(|row| coordinates.expand_all(g, row)).collect();
+        if is_mixed { expanded.concat() } else { in_blocks(&expanded) }
     };
     let full_position = square(g, &by_position, coordinates);
     let full_velocity = square(g, &by_velocity, &velocities);
@@ -399,6 +424,18 @@ fn force(
         Whole::new(RoutineKind::Force, f.to_vec(), vec![f.to_vec()], hazards[0]),
         Whole::new(RoutineKind::Jacobians, reduced, vec![f.to_vec(), full_position, full_velocity], hazards[1]),
     ]
+}
+
+/// Arranges the rows of a matrix of points in 3×3 blocks.
+fn in_blocks(rows: &[Vec<NodeId>]) -> Vec<NodeId> {
+    let points = rows.len() / 3;
+    let mut blocks = Vec::with_capacity(9 * points * points);
+    for (i, j) in (0..points).flat_map(|i| (0..points).map(move |j| (i, j))) {
+        for row in &rows[3 * i..3 * i + 3] {
+            blocks.extend_from_slice(&row[3 * j..3 * j + 3]);
+        }
+    }
+    blocks
 }
 
 fn residual(g: &mut Graph, r: &[NodeId], coordinates: &Coordinates, routes: &mut Vec<Routes>) -> Vec<Whole> {

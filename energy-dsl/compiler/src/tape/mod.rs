@@ -21,6 +21,7 @@ pub(crate) fn tapes(plan: &Plan) -> Result<Routines, TooLarge> {
     Ok(Routines {
         name: plan.declaration.name.clone().into_owned(),
         coordinates: plan.coordinates,
+        increments: plan.declaration.increments(),
         parameters: plan.parameters,
         shape: plan.shape,
         rest: routine_tape(&plan.rest, Vec::new())?,
@@ -33,7 +34,8 @@ pub(crate) fn tapes(plan: &Plan) -> Result<Routines, TooLarge> {
 /// Writes a routine to a tape. Positions come first, then velocities, if it reads any.
 fn with_leading_inputs(plan: &Plan, routine: &RoutinePlan) -> Result<Routine, TooLarge> {
     let coordinates = u16::try_from(plan.coordinates).map_err(|_| TooLarge)?;
-    let velocities = if routine.reads_velocities() { coordinates } else { 0 };
+    let increments = u16::try_from(plan.declaration.increments()).map_err(|_| TooLarge)?;
+    let velocities = if routine.reads_velocities() { increments } else { 0 };
     let leading = (0..coordinates).map(Input::Position).chain((0..velocities).map(Input::Velocity));
     routine_tape(routine, leading.collect())
 }

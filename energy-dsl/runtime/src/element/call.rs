@@ -5,8 +5,8 @@
 
 use crate::array::Array;
 use crate::element::{
-    Constraint, ForceLaw, MixedConstraint, MixedForce, MixedPotential, Potential, ReducedPotential, Residual, Stateful,
-    Vector3, VertexPotential,
+    Constraint, ForceLaw, MixedConstraint, MixedForce, MixedPotential, Potential, ReducedPotential, Residual,
+    StateSensitivity, Stateful, Vector3, VertexPotential,
 };
 use crate::numbers::Real;
 use crate::numbers::{Kernel, Level, read_alone};
@@ -97,8 +97,8 @@ call!(MixedGaussNewtonCall: MixedConstraint,
 call!(NextCall: Stateful, next_at(1 numbers E::Unknowns) -> NextState<T, E::State>);
 call!(NextJacobiansCall: Stateful,
     next_jacobians_at(1 numbers E::Unknowns) -> NextJacobians<T, E::State, E::ByUnknowns, E::ByState>);
-call!(StateJacobianCall: Stateful,
-    state_jacobian_at(1 numbers E::Unknowns) -> StateJacobian<T, E::Increments, E::StateColumns>);
+call!(StateJacobianCall: StateSensitivity,
+    state_jacobian_at(1 numbers E::Unknowns) -> StateJacobian<T, E::Slopes, E::SlopesByState>);
 
 /// Calls the routine of one vertex.
 #[doc(hidden)]

@@ -118,16 +118,12 @@ pub trait MixedConstraint<T: Real>: MixedPotential<T> + MixedForce<T> {
 pub trait Stateful<T: Real>: Element {
     /// The unknowns: `[T; U]`, flat also for points.
     type Unknowns: Array<T>;
-    /// One number per increment of the unknowns: `[T; D]`.
-    type Increments: Array<T>;
     /// The state: `[T; S]`.
     type State: Array<T>;
     /// A matrix, row by row: `[T; S * D]`.
     type ByUnknowns: Array<T>;
     /// A matrix, row by row: `[T; S * S]`.
     type ByState: Array<T>;
-    /// A matrix, row by row: `[T; D * S]`.
-    type StateColumns: Array<T>;
 
     /// Returns the state, in declared order.
     fn state(&self) -> Self::State;
@@ -144,9 +140,18 @@ pub trait Stateful<T: Real>: Element {
         &self,
         u: &Self::Unknowns,
     ) -> NextJacobians<T, Self::State, Self::ByUnknowns, Self::ByState>;
-    /// Returns ∂U/∂u and ∂²U/∂u∂(state) of the element's energy, for derivatives through time.
-    fn state_jacobian(&self, u: &Self::Unknowns) -> StateJacobian<T, Self::Increments, Self::StateColumns>;
+}
+
+/// How the first derivatives of an element with memory depend on its state, for derivatives through time.
+pub trait StateSensitivity<T: Real>: Stateful<T> {
+    /// One number per increment, or per row of a residual: `[T; D]`.
+    type Slopes: Array<T>;
+    /// A matrix, row by row: `[T; D * S]`.
+    type SlopesByState: Array<T>;
+
+    /// Returns ∂U/∂u and ∂²U/∂u∂(state) of an energy or of a constraint's ½ k_s CᵀC, or r and ∂r/∂(state) of a
+    /// residual.
+    fn state_jacobian(&self, u: &Self::Unknowns) -> StateJacobian<T, Self::Slopes, Self::SlopesByState>;
     /// [`Self::state_jacobian`] for callers that run at SIMD level `L`.
-    fn state_jacobian_at<L: Level>(&self, u: &Self::Unknowns)
-    -> StateJacobian<T, Self::Increments, Self::StateColumns>;
+    fn state_jacobian_at<L: Level>(&self, u: &Self::Unknowns) -> StateJacobian<T, Self::Slopes, Self::SlopesByState>;
 }

@@ -25,7 +25,7 @@ use crate::results::{
 use call::WrittenTo;
 #[doc(hidden)]
 pub use call::*;
-pub use mixed::{MixedConstraint, MixedForce, MixedPotential, Stateful};
+pub use mixed::{MixedConstraint, MixedForce, MixedPotential, StateSensitivity, Stateful};
 
 /// A point or vector in space.
 pub type Vector3<T> = [T; 3];
@@ -82,6 +82,8 @@ pub struct Outputs<T: Number> {
     /// - forces: `force`, `dfdx`, `dfdv`
     /// - constraints: all six, `constraint` and `jacobian`
     /// - residuals: `residual` and `jacobian`
+    /// - with a state: `next`, `next_by_unknowns`, `next_by_state` and, but for forces, `slopes_by_state`: ∂²U/∂u∂(state),
+    ///   or ∂r/∂(state)
     pub blocks: Vec<(&'static str, Vec<T>)>,
     /// Lower-order results that a routine also returns: routine, name of the block, numbers. They must equal that
     /// block.

@@ -148,9 +148,11 @@ impl<S: Float> TapeElements<S> {
             true => Ok(()),
             false => Err(BatchError::Input { of, needed, given }),
         };
-        for places in places {
+        // Positions come first, then velocities.
+        let widths = [self.routines.coordinates, self.routines.increments];
+        for (places, width) in places.into_iter().zip(widths) {
             match places {
-                Places::Rows(rows) => input("coordinates", range.len() * self.routines.coordinates, rows.len())?,
+                Places::Rows(rows) => input("coordinates", range.len() * width, rows.len())?,
                 Places::Gathered { vectors, stencils } => {
                     let needed = self.count.next_multiple_of(TAPE_BLOCK) * self.routines.coordinates / 3;
                     input("stencils", needed, stencils.len())?;

@@ -8,10 +8,12 @@ use crate::numbers::{Care, Flags, Fused, Level, Mask, Number, Ray, Roles, fill_o
 /// The source of an input number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Input {
-    /// Coordinate of the positions (point · 3 + axis), or an unknown of a residual.
+    /// Number of the unknowns: coordinate point · 3 + axis of points.
     Position(u16),
-    /// Coordinate of the velocities.
+    /// Number of the velocities, by increments of the unknowns.
     Velocity(u16),
+    /// Increment of a rotation, 0. Derivatives are taken with respect to it; nothing reads it.
+    Increment(u16),
     /// Index among the parameter numbers.
     Parameter(u16),
     /// Index among the rest-shape numbers.
@@ -186,6 +188,8 @@ pub struct Routines {
     /// Coordinates of the points, or unknowns of a residual. They are the first inputs of every routine but `rest`;
     /// velocities follow, if the routine reads any.
     pub coordinates: usize,
+    /// Number of velocities: the coordinates in which the unknowns move.
+    pub increments: usize,
     /// Number of parameter numbers.
     pub parameters: usize,
     /// Number of rest-shape numbers.

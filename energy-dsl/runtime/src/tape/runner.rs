@@ -155,6 +155,7 @@ impl<S: Float> State<S> {
         for (slot, input) in routine.inputs.iter().enumerate() {
             let number = match *input {
                 Input::Position(_) | Input::Velocity(_) => continue,
+                Input::Increment(_) => unreachable!("compiler bug: increments are 0, and nothing reads them"),
                 Input::Parameter(number) => usize::from(number),
                 Input::Precomputed(number) if repetition.is_some_and(|all| usize::from(number) >= all.shared) => {
                     of_term.push((slot, usize::from(number)));
@@ -199,7 +200,7 @@ impl<'a, S: Float> Runner<'a, S> {
         let (positions, others) = slots.numbers_mut().split_at_mut(coordinates);
         places.fill(rows, first, count, positions);
         if let Some(velocities) = velocities.filter(|_| reads_velocities(routine, coordinates)) {
-            velocities.fill(rows, first, count, &mut others[..coordinates]);
+            velocities.fill(rows, first, count, &mut others[..elements.routines.increments]);
         }
         let block = first / TAPE_BLOCK;
         for &(slot, number) in &*stored {

@@ -68,6 +68,7 @@ fn routines() -> Arc<Routines> {
     Arc::new(Routines {
         name,
         coordinates: COORDINATES,
+        increments: COORDINATES,
         parameters: 2,
         shape: 1,
         rest,

@@ -1,6 +1,6 @@
 //! Deformations with extreme singular values: needles, near mirror images, equal and nearly equal stretches.
 
-use energy_dsl::Declaration;
+use energy_dsl::{Declaration, FieldKind};
 
 use super::rest::RestShape;
 use super::{Extreme, dyadic};
@@ -73,13 +73,18 @@ pub(super) fn of_edges(ordinary: &Sample) -> Vec<Extreme> {
     each(dimension, place)
 }
 
+/// Whether an input may be a square matrix. A rotation has four numbers, too.
+fn is_square(field: &energy_dsl::Field, dimension: usize) -> bool {
+    field.size == dimension * dimension && field.kind == FieldKind::Numbers
+}
+
 /// Returns inputs whose matrices, 2×2 or 3×3, are such ones: unknowns, or else parameters.
 pub(super) fn of_matrices(declaration: &Declaration, ordinary: &Sample) -> Vec<Extreme> {
     let place = |fields: &[energy_dsl::Field], numbers: &[f64], dimension: usize, stretches: [f64; 3], turned: bool| {
         let mut numbers = numbers.to_vec();
         let mut first = 0;
         for field in fields {
-            if field.size == dimension * dimension {
+            if is_square(field, dimension) {
                 for row in 0..dimension {
                     for column in 0..dimension {
                         let turn =
@@ -96,7 +101,7 @@ pub(super) fn of_matrices(declaration: &Declaration, ordinary: &Sample) -> Vec<E
     };
     let mut list = Vec::new();
     for dimension in [2, 3] {
-        let has = |fields: &[energy_dsl::Field]| fields.iter().any(|field| field.size == dimension * dimension);
+        let has = |fields: &[energy_dsl::Field]| fields.iter().any(|field| is_square(field, dimension));
         if has(&declaration.points) {
             list.extend(each(dimension, |stretches, turned| {
                 let positions = place(&declaration.points, &ordinary.positions, dimension, stretches, turned);

@@ -6,7 +6,7 @@ use fastrand::Rng;
 use super::{Extreme, dyadic};
 use crate::audit::subject::Subject;
 use crate::formula::rows;
-use crate::sample::Sample;
+use crate::sample::{Sample, has_points};
 
 /// Binary exponents of the strains: 1e-3 to 2e-12.
 const STRAINS: [i32; 4] = [-30, -20, -39, -10];
@@ -26,7 +26,7 @@ impl RestShape {
         let fits = (2..=3).contains(&dimension)
             && declaration.rest.len() == declaration.points.len()
             && declaration.rest.iter().all(|field| field.size == dimension)
-            && declaration.points.iter().all(|point| point.size == 3);
+            && has_points(declaration);
         fits.then(|| Self { dimension, points: sample.rest.iter().map(|&x| dyadic(x)).collect() })
     }
 

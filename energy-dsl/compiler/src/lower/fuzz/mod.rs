@@ -60,7 +60,8 @@ fn agrees(source: &str, random: &mut Random) -> bool {
         rest
     };
     let (mut rest, mut whole) = (lowering(), lowering());
-    let (looped, unrolled) = (repeated(&alike, &mut rest), unrolled(&program, &mut whole));
+    let (outputs, formula, _) = unrolled(&program, &mut whole);
+    let (looped, unrolled) = (repeated(&alike, &mut rest), (outputs, formula));
     for _ in 0..3 {
         let mut numbers = |n: usize| -> Vec<f64> { (0..n).map(|_| random.number()).collect() };
         let (positions, shape, parameters) = (numbers(9), numbers(12), numbers(7));
