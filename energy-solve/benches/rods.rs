@@ -2,13 +2,9 @@
 //!
 //! `cargo bench -p energy-solve --bench rods`
 
-use std::borrow::Cow::Borrowed;
 use std::time::{Duration, Instant};
 
-use energy_dsl::{
-    Declaration, Element, Field, FieldKind, Flags, Inputs, Kind, Lane, Level, MixedGradient, MixedHessian,
-    MixedPotential, MixedProduct, Outputs, PackedMixed, Real, RestError, Stored, Value,
-};
+use energy_dsl::energy;
 use energy_solve::{
     BandOrder, BorderedSolver, Curvature, Inertia, KindSolver, MixedBody, MixedIntegrator, MixedNewtonError,
     MixedNewtonOptions, MixedNewtonReport, MixedScheme, MixedState, MixedSystem, MixedTerm, UnknownKind,
@@ -22,172 +18,19 @@ const BAND: KindSolver = KindSolver::Band(BandOrder::Narrowest);
 /// Distance of nodes, in m.
 const SPACING: f64 = 0.01;
 
-/// Stretch k/2 (‖x₁ − x₀‖ − l)², bending b/2 ‖x₀ − 2 x₁ + x₂‖², twist c/2 (θ₁ − θ₀)², coupling c (θ₁ − θ₀) (x₂ − x₁)₃/l,
-/// and weight w (x₁)₃.
-#[derive(Clone, Copy, Debug)]
-struct Rod<T> {
-    numbers: [T; 5],
-}
-
-const POINT: Field = Field { name: Borrowed("x"), kind: FieldKind::Point, shared: false, size: 3, unit: Borrowed("m") };
-const ANGLE: Field =
-    Field { name: Borrowed("θ"), kind: FieldKind::Numbers, shared: false, size: 1, unit: Borrowed("rad") };
-
-static ROD: Declaration = Declaration {
-    name: Borrowed("Rod"),
-    kind: Kind::Energy,
-    docs: Borrowed(""),
-    formula: Borrowed(""),
-    source: Borrowed(""),
-    points: Borrowed(&[POINT, POINT, POINT, ANGLE, ANGLE]),
-    rest: Borrowed(&[]),
-    parameters: Borrowed(&[]),
-    state: Borrowed(&[]),
-    rows: 1,
-    properties: Borrowed(&[]),
-    translation_invariant: false,
-    curved: true,
-    quadratic: false,
-    velocity_dependent: false,
-    symmetric: true,
-    reduced_coordinates: 0,
-    reduced_vectors: Borrowed(&[]),
-    dihedral: None,
-    primitives: Borrowed(&[]),
-    routines: Borrowed(&[]),
-};
-
-impl<T: Real> Element for Rod<T> {
-    const DECLARATION: &'static Declaration = &ROD;
-    type Over<R: Real> = Rod<R>;
-
-    fn evaluate<R: Real>(_: &Inputs<'_, R>) -> Result<Outputs<R>, RestError> {
-        Err(RestError { element: "Rod".into() })
-    }
-}
-
-impl<T: Real> Rod<T> {
-    /// Returns the energy, with the vectors and numbers of its derivatives: d, stretch, ‖d‖, bending vector, twist.
-    #[inline(always)]
-    fn parts(&self, u: &[T; 11]) -> (T, [T; 3], T, T, [T; 3], T) {
-        let [k, b, c, w, l] = self.numbers;
-        let d = [u[3] - u[0], u[4] - u[1], u[5] - u[2]];
-        let length = (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]).sqrt();
-        let stretch = length - l;
-        let mut bend = d;
-        for i in 0..3 {
-            bend[i] = u[6 + i] - u[3 + i] - d[i];
-        }
-        let twist = u[10] - u[9];
-        let square = bend[0] * bend[0] + bend[1] * bend[1] + bend[2] * bend[2];
-        let energy = T::from_f64(0.5) * (k * stretch * stretch + b * square + c * twist * twist)
-            + c * twist * (u[8] - u[5]) / l
-            + w * u[5];
-        (energy, d, stretch, length, bend, twist)
-    }
-
-    #[inline(always)]
-    fn first(&self, u: &[T; 11]) -> (T, [T; 11]) {
-        let ([k, b, c, w, l], (energy, d, stretch, length, bend, twist)) = (self.numbers, self.parts(u));
-        let mut g = [T::from_f64(0.0); 11];
-        for i in 0..3 {
-            let (along, across) = (k * stretch * d[i] / length, b * bend[i]);
-            (g[i], g[3 + i], g[6 + i]) = (across - along, along - (across + across), across);
-        }
-        let (coupled, turned) = (c * twist / l, c * twist + c * (u[8] - u[5]) / l);
-        (g[5], g[8]) = (g[5] - coupled + w, g[8] + coupled);
-        (g[9], g[10]) = (-turned, turned);
-        (energy, g)
-    }
-}
-
-/// Returns the index of entry (i, j), i ≤ j, of the triangle.
-const fn at(i: usize, j: usize) -> usize {
-    i * (21 - i) / 2 + j
-}
-
-impl<T: Real> MixedPotential<T> for Rod<T> {
-    type Unknowns = [T; 11];
-    type Increments = [T; 11];
-    type Upper = [T; 66];
-
-    fn value(&self, u: &[T; 11]) -> Value<T> {
-        Value { value: self.parts(u).0, flags: Flags::clear() }
-    }
-
-    #[inline(always)]
-    fn value_at<L: Level>(&self, u: &[T; 11]) -> Value<T> {
-        Value { value: self.parts(u).0, flags: Flags::clear() }
-    }
-
-    fn gradient(&self, u: &[T; 11]) -> MixedGradient<T, [T; 11]> {
-        let (value, gradient) = self.first(u);
-        MixedGradient { value, gradient, flags: Flags::clear() }
-    }
-
-    #[inline(always)]
-    fn gradient_at<L: Level>(&self, u: &[T; 11]) -> MixedGradient<T, [T; 11]> {
-        let (value, gradient) = self.first(u);
-        MixedGradient { value, gradient, flags: Flags::clear() }
-    }
-
-    fn hessian(&self, u: &[T; 11]) -> MixedHessian<T, [T; 11], [T; 66]> {
-        self.hessian_at::<energy_dsl::Baseline>(u)
-    }
-
-    #[inline(always)]
-    fn hessian_at<L: Level>(&self, u: &[T; 11]) -> MixedHessian<T, [T; 11], [T; 66]> {
-        let ([k, b, c, _, l], (value, gradient)) = (self.numbers, self.first(u));
-        let (_, d, stretch, length, ..) = self.parts(u);
-        let mut h = [T::from_f64(0.0); 66];
-        let across = k * stretch / length;
-        let part = k * l / (length * length * length);
-        let (twice, four) = (b + b, T::from_f64(4.0) * b);
-        for i in 0..3 {
-            for j in 0..3 {
-                let along = part * d[i] * d[j];
-                if i < j {
-                    (h[at(i, j)], h[at(3 + i, 3 + j)]) = (along, along);
-                }
-                h[at(i, 3 + j)] = -along;
-            }
-            let along = part * d[i] * d[i] + across;
-            (h[at(i, i)], h[at(i, 3 + i)], h[at(i, 6 + i)]) = (along + b, -along - twice, b);
-            (h[at(3 + i, 3 + i)], h[at(3 + i, 6 + i)], h[at(6 + i, 6 + i)]) = (along + four, -twice, b);
-        }
-        let coupled = c / l;
-        (h[at(9, 9)], h[at(9, 10)], h[at(10, 10)]) = (c, -c, c);
-        (h[at(5, 9)], h[at(5, 10)], h[at(8, 9)], h[at(8, 10)]) = (coupled, -coupled, -coupled, coupled);
-        MixedHessian { value, gradient, hessian: h, flags: Flags::clear() }
-    }
-
-    fn hessian_vector(&self, _: &[T; 11], _: &[T; 11]) -> MixedProduct<T, [T; 11]> {
-        unreachable!("a direct solver does not use it")
-    }
-
-    fn hessian_vector_at<L: Level>(&self, _: &[T; 11], _: &[T; 11]) -> MixedProduct<T, [T; 11]> {
-        unreachable!("a direct solver does not use it")
-    }
-}
-
-impl Stored<f64> for Rod<f64> {
-    const NUMBERS: usize = 5;
-
-    fn store(&self, numbers: &mut [f64], stride: usize) {
-        self.numbers.iter().enumerate().for_each(|(i, own)| numbers[i * stride] = *own);
-    }
-}
-
-impl PackedMixed<f64> for Rod<f64> {
-    type Wide<V: Lane<f64>> = Rod<V>;
-
-    #[inline(always)]
-    fn load<V: Lane<f64>>(numbers: &[f64], stride: usize) -> Rod<V> {
-        let mut own = [V::splat(0.0); 5];
-        for i in 0..5 {
-            own[i] = V::load(&numbers[i * stride..]);
-        }
-        Rod { numbers: own }
+energy! {
+    /// A node of a discrete elastic rod (Bergou, Wardetzky, Robinson, Audoly and Grinspun 2008) with fixed reference
+    /// directors u and v of its two edges: stretch of the first one, bending by material curvatures, twist, and weight.
+    energy Rod(
+        x0, x1, x2: Point, θ0, θ1: Scalar[rad];
+        u0, v0, u1, v1: Vec3, k: Scalar[N/m], B: Scalar[J*m], C: Scalar[J*m], l: Scalar[m], w: Scalar[N]
+    ) {
+        let d = x1 - x0;
+        let e = x2 - x1;
+        let κb = 2 * cross(d, e) / (norm(d) * norm(e) + dot(d, e));
+        let κ1 = dot(κb, cos(θ0) * v0 - sin(θ0) * u0 + cos(θ1) * v1 - sin(θ1) * u1) / 2;
+        let κ2 = dot(κb, cos(θ0) * u0 + sin(θ0) * v0 + cos(θ1) * u1 + sin(θ1) * v1) / 2;
+        k / 2 * (norm(d) - l)^2 + B / (2 * l) * (κ1^2 + 2 * κ2^2) + C / (2 * l) * (θ1 - θ0)^2 + w * x1.z
     }
 }
 
@@ -196,7 +39,8 @@ fn rod(nodes: usize) -> (MixedSystem, Vec<f64>) {
     let kind = |i: usize| if i.is_multiple_of(2) { UnknownKind::Vector3 } else { UnknownKind::Scalar };
     let kinds: Vec<UnknownKind> = (0..2 * nodes - 1).map(kind).collect();
     let body = MixedBody::new(&kinds, SPACING).with_fixed(&[0, 1, 2]).expect("these unknowns exist");
-    let element = Rod { numbers: [1e3, 100.0, 1e-2, 1e-4, SPACING] };
+    let (y, z) = ([0.0, 1.0, 0.0], [0.0, 0.0, 1.0]);
+    let element = Rod::new(y, z, y, z, 1e3, 1e-4, 1e-4, SPACING, 1e-4);
     let stencils: Vec<[usize; 5]> = (0..nodes - 2).map(|i| 2 * i).map(|i| [i, i + 2, i + 4, i + 1, i + 3]).collect();
     let term = MixedTerm::new("rod", vec![element; nodes - 2], &stencils).expect("a stencil per element");
     let system = MixedSystem::new(body, vec![term]).expect("stencils fit");

@@ -2,8 +2,7 @@
 
 use energy_dsl::{
     Declaration, Element, Field, FieldKind, Flags, Inputs, Lane, Level, MixedGradient, MixedHessian, MixedPotential,
-    MixedProduct, NextJacobians, NextState, Outputs, PackedMixed, Real, RestError, StateJacobian, Stateful, Stored,
-    Value,
+    MixedProduct, NextJacobians, NextState, Outputs, PackedMixed, Real, RestError, Stateful, Stored, Value,
 };
 
 use super::jets::{Jet, cross, declared, dot, field, minus, mixed_element, rotated, seeds};
@@ -119,11 +118,9 @@ mixed_element!(
 
 impl Stateful<f64> for Relaxing {
     type Unknowns = [f64; 7];
-    type Increments = [f64; 7];
     type State = [f64; 1];
     type ByUnknowns = [f64; 7];
     type ByState = [f64; 1];
-    type StateColumns = [f64; 7];
 
     fn state(&self) -> [f64; 1] {
         [self.relaxed]
@@ -147,14 +144,6 @@ impl Stateful<f64> for Relaxing {
     }
 
     fn next_jacobians_at<L: Level>(&self, _: &[f64; 7]) -> NextJacobians<f64, [f64; 1], [f64; 7], [f64; 1]> {
-        unreachable!("steps do not use it")
-    }
-
-    fn state_jacobian(&self, _: &[f64; 7]) -> StateJacobian<f64, [f64; 7], [f64; 7]> {
-        unreachable!("steps do not use it")
-    }
-
-    fn state_jacobian_at<L: Level>(&self, _: &[f64; 7]) -> StateJacobian<f64, [f64; 7], [f64; 7]> {
         unreachable!("steps do not use it")
     }
 }
