@@ -22,7 +22,7 @@ const ARM: f64 = 0.5;
 const MOMENTS: [f64; 3] = [0.04, 0.06, 0.02];
 /// Acceleration of gravity, in m/s², and time step, in s.
 const GRAVITY: f64 = 9.81;
-const STEP: f64 = 2e-3;
+const STEP: f64 = 1e-3;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     // An orientation and a centre. A radian counts as a move by the length of the arm.

@@ -70,13 +70,16 @@ fn run<S: Float, E: PackedMixed<S>, R: Routine<E, S>>(
     dispatch(EachBatch { packed, range, unknowns, routine })
 }
 
+/// The unknowns of a potential over lanes `V`.
+type WideUnknowns<E, V, S> = <<E as PackedMixed<S>>::Wide<V> as MixedPotential<V>>::Unknowns;
+
 /// A routine that stores the results of one batch.
 trait Routine<E: PackedMixed<S>, S: Float> {
     /// Evaluates elements, one per lane, and stores the results of the first `count` from row `place` on.
     fn store<L: Level>(
         &mut self,
         element: &E::Wide<S::Lanes<L>>,
-        unknowns: &<E::Wide<S::Lanes<L>> as MixedPotential<S::Lanes<L>>>::Unknowns,
+        unknowns: &WideUnknowns<E, S::Lanes<L>, S>,
         place: usize,
         count: usize,
     ) -> Flags<S::Lanes<L>>;
@@ -119,7 +122,7 @@ impl<S: Float, E: PackedMixed<S>> Routine<E, S> for Values<'_, S> {
     fn store<L: Level>(
         &mut self,
         element: &E::Wide<S::Lanes<L>>,
-        unknowns: &<E::Wide<S::Lanes<L>> as MixedPotential<S::Lanes<L>>>::Unknowns,
+        unknowns: &WideUnknowns<E, S::Lanes<L>, S>,
         place: usize,
         count: usize,
     ) -> Flags<S::Lanes<L>> {
@@ -139,7 +142,7 @@ impl<S: Float, E: PackedMixed<S>> Routine<E, S> for Gradients<'_, S> {
     fn store<L: Level>(
         &mut self,
         element: &E::Wide<S::Lanes<L>>,
-        unknowns: &<E::Wide<S::Lanes<L>> as MixedPotential<S::Lanes<L>>>::Unknowns,
+        unknowns: &WideUnknowns<E, S::Lanes<L>, S>,
         place: usize,
         count: usize,
     ) -> Flags<S::Lanes<L>> {
@@ -161,7 +164,7 @@ impl<S: Float, E: PackedMixed<S>> Routine<E, S> for Hessians<'_, S> {
     fn store<L: Level>(
         &mut self,
         element: &E::Wide<S::Lanes<L>>,
-        unknowns: &<E::Wide<S::Lanes<L>> as MixedPotential<S::Lanes<L>>>::Unknowns,
+        unknowns: &WideUnknowns<E, S::Lanes<L>, S>,
         place: usize,
         count: usize,
     ) -> Flags<S::Lanes<L>> {

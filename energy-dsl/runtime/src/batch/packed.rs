@@ -243,7 +243,7 @@ pub(super) fn gather_numbers<S: Real, V: Lane<S>, U: Array<V>>(stencils: &[u32],
     let mut wide = U::repeat(V::from_f64(0.0));
     for (number, wide) in wide.as_mut().iter_mut().enumerate() {
         let indices = &stencils[number * BLOCK..][..V::LANES];
-        *wide = V::from_fn(|lane| unknowns[indices[lane] as usize].clone());
+        *wide = V::from_fn(|lane| unknowns[indices[lane] as usize]);
     }
     wide
 }
