@@ -18,4 +18,5 @@ mod recognition;
 mod reference;
 mod singular;
 mod ui;
+mod unknowns;
 mod vertex;

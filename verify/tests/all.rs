@@ -17,4 +17,5 @@ mod singular_programs;
 mod spectral_accuracy;
 mod structure;
 mod uncompensated;
+mod unknowns;
 mod user_formulas;

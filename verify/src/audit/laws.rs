@@ -2,7 +2,7 @@
 //! units.
 
 use energy_compiler::unit_exponents;
-use energy_dsl::Kind;
+use energy_dsl::{Declaration, Field, Kind};
 
 use super::accuracy::enters_as_edges;
 use super::auditor::{Auditor, Finding};
@@ -183,17 +183,14 @@ impl Auditor<'_> {
     fn units(&mut self, sample: &Sample) -> Result<(), NoAnswer> {
         let declaration = self.declaration;
         let result = match declaration.kind {
-            Kind::Energy => [1.0, 2.0, -2.0],
-            Kind::Force => [1.0, 1.0, -2.0],
+            Kind::Energy => [1.0, 2.0, -2.0, 0.0],
+            Kind::Force => [1.0, 1.0, -2.0, 0.0],
             Kind::Constraint | Kind::Residual => return Ok(()),
         };
-        if !has_points(declaration)
-            || !declaration.rest.iter().chain(&*declaration.parameters).all(|f| !f.unit.is_empty())
-        {
+        if !has_points(declaration) || !scaled_fields(declaration).all(|field| !field.unit.is_empty()) {
             return Ok(());
         }
-        let annotated =
-            declaration.rest.iter().chain(&*declaration.parameters).any(|f| f.unit != "1" && f.unit != "rad");
+        let annotated = scaled_fields(declaration).any(|field| field.unit != "1" && field.unit != "rad");
         let Some(exponents) = fields(declaration).collect::<Option<Vec<_>>>() else { return Ok(()) };
         if !annotated {
             return Ok(());
@@ -203,14 +200,14 @@ impl Auditor<'_> {
             numbers.iter().map(|x| x * f64::from(power(exponents.next().unwrap_or(NUMBER))).exp2()).collect()
         };
         let (rest, parameters) = (scaled(&sample.rest), scaled(&sample.parameters));
-        let by = |numbers: &[f64], unit: [f64; 3]| -> Vec<f64> {
+        let by = |numbers: &[f64], unit: [f64; 4]| -> Vec<f64> {
             numbers.iter().map(|x| x * f64::from(power(unit)).exp2()).collect()
         };
         let there = Sample {
             parameters,
             rest,
             positions: by(&sample.positions, LENGTH),
-            velocities: by(&sample.velocities, [0.0, 1.0, -1.0]),
+            velocities: by(&sample.velocities, [0.0, 1.0, -1.0, 0.0]),
         };
         // Each derivative divides by a length or a velocity.
         let shift = |block: BlockName| {
@@ -220,7 +217,7 @@ impl Auditor<'_> {
                 _ => 0,
             };
             let velocities = i32::from(block == BlockName::ForceByVelocity);
-            power(result) - lengths * power(LENGTH) - velocities * power([0.0, 1.0, -1.0])
+            power(result) - lengths * power(LENGTH) - velocities * power([0.0, 1.0, -1.0, 0.0])
         };
         self.same_bits(Check::Units, sample, &there, "in kilograms of 8, metres of ¼, seconds of 2", shift)
     }
@@ -236,7 +233,10 @@ impl Auditor<'_> {
     ) -> Result<(), NoAnswer> {
         let (before, after) = (self.answer(here)?, self.answer(there)?);
         let declaration = self.declaration;
-        for (a, b) in before.blocks.iter().zip(&after.blocks) {
+        // The blocks of a state have units of their own.
+        let of_kind = BlockName::of_kind(declaration.kind);
+        let pairs = before.blocks.iter().zip(&after.blocks).filter(|(block, _)| of_kind.contains(&block.name));
+        for (a, b) in pairs {
             let expected: Vec<f64> = a.numbers.iter().map(|x| x * f64::from(shift(a.name)).exp2()).collect();
             let (entry, error) = worst(&expected, &b.numbers);
             let scale = largest(&expected);
@@ -321,19 +321,23 @@ fn is_damping(added: &[f64], by_velocity: &Block) -> bool {
     symmetric || total <= 1e-12 * largest(added)
 }
 
-const NUMBER: [f64; 3] = [0.0; 3];
-const LENGTH: [f64; 3] = [0.0, 1.0, 0.0];
+const NUMBER: [f64; 4] = [0.0; 4];
+const LENGTH: [f64; 4] = [0.0, 1.0, 0.0, 0.0];
 
-/// Returns log₂ of the factor by which a quantity's number changes in units of 8 kg, ¼ m and 2 s.
-fn power([kilograms, metres, seconds]: [f64; 3]) -> i32 {
+/// Returns log₂ of the factor by which a quantity's number changes in units of 8 kg, ¼ m, 2 s and 1 K.
+fn power([kilograms, metres, seconds, _]: [f64; 4]) -> i32 {
     // Exponents of declared units are integers here; a half would not give a power of two, and fails the check.
     (-3.0 * kilograms + 2.0 * metres - seconds).round() as i32
 }
 
-/// Returns the unit of each number of the rest shape, then of the parameters.
-fn fields(declaration: &energy_dsl::Declaration) -> impl Iterator<Item = Option<[f64; 3]>> {
-    let all = declaration.rest.iter().chain(&*declaration.parameters);
-    all.flat_map(|field| std::iter::repeat_n(unit_exponents(&field.unit), field.size))
+/// Lists the inputs whose numbers change with the units: rest shape, parameters and state.
+fn scaled_fields(declaration: &Declaration) -> impl Iterator<Item = &Field> {
+    declaration.rest.iter().chain(&*declaration.parameters).chain(&*declaration.state)
+}
+
+/// Returns the unit of each number of the rest shape, then of the parameters and of the state.
+fn fields(declaration: &Declaration) -> impl Iterator<Item = Option<[f64; 4]>> {
+    scaled_fields(declaration).flat_map(|field| std::iter::repeat_n(unit_exponents(&field.unit), field.size))
 }
 
 /// Returns the position and size of the largest difference.

@@ -5,7 +5,7 @@ use super::expression::{Checker, Meaning, constant};
 use super::typed::{Typed, TypedKind};
 use crate::diagnostic::{Diagnostic, Span};
 use crate::functions::{self, Shape};
-use crate::syntax::{Expression, Name, Sum};
+use crate::syntax::{Expression, ExpressionKind, Name, Sum};
 
 /// Maximum number of terms that the sums of a declaration unroll to.
 const MOST_TERMS: usize = 1024;
@@ -85,6 +85,37 @@ impl<'a> Checker<'a> {
         };
         let arguments = vec![value, constant(number as f64, span)];
         Some(Typed { kind: TypedKind::Call(function, arguments), shape, span: span.clone() })
+    }
+
+    /// Checks `len(a)`, the number of entries of an array.
+    #[inline(never)]
+    pub(super) fn length(&mut self, name: &Name, arguments: &'a [Expression]) -> Option<Typed> {
+        let [of] = arguments else {
+            return self.error(&name.span, "`len` takes an array, as in len(ring)");
+        };
+        // The name of an array suffices, also where its entries are unknown: in the length of another array.
+        if let ExpressionKind::Name(array) = &of.kind
+            && let Some(Some(Meaning::Input(_, _, _, Some(length)))) = self.find(&array.text)
+        {
+            return Some(constant(length as f64, &name.span));
+        }
+        let found = self.expression(of)?.shape;
+        match found {
+            Shape::Array(length) => Some(constant(length.into(), &name.span)),
+            _ => self.error(&of.span, format!("`len` takes an array, but this is {found}")),
+        }
+    }
+
+    /// Checks `a % b` of constants, as in an index that runs around a ring.
+    #[inline(never)]
+    pub(super) fn remainder(&mut self, name: &Name, arguments: &'a [Expression]) -> Option<Typed> {
+        let [a, b] = arguments else { return self.error(&name.span, "`%` stands between two numbers") };
+        let (dividend, divisor) = (self.whole_number(a, "the left side of `%`"), self.whole_number(b, "a divisor"));
+        let (dividend, divisor) = (dividend?, divisor?);
+        match dividend.checked_rem(divisor) {
+            Some(rest) => Some(constant(rest as f64, &name.span)),
+            None => self.error(&b.span, "`%` by 0"),
+        }
     }
 
     /// Checks and unrolls `sum(j in first..end, term)`.

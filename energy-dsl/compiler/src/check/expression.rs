@@ -344,6 +344,10 @@ impl<'a> Checker<'a> {
         match name.text.as_str() {
             "gradient" => return self.gradient(name, arguments),
             "identity" => return self.identity(name, arguments),
+            "%" => return self.remainder(name, arguments),
+            "len" if !self.functions.iter().any(|function| function.name.text == "len") => {
+                return self.length(name, arguments);
+            }
             _ => {}
         }
         let checked = self.arguments(arguments)?;

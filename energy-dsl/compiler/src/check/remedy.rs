@@ -70,7 +70,7 @@ fn look_alike<'a>(name: &str, mut known: impl Iterator<Item = &'a str>) -> Optio
 
 /// Returns the remedy for arguments whose shapes a function does not take.
 pub(super) fn for_shapes(function: &Function, shapes: &[Shape]) -> String {
-    use Shape::{Matrix, Scalar, Vector};
+    use Shape::{DualQuat, Matrix, Motion, Quat, Scalar, Vector};
     let name = function.name;
     match (name, shapes) {
         ("+" | "-", [Scalar, Matrix(n, m)] | [Matrix(n, m), Scalar]) if n == m => {
@@ -80,6 +80,9 @@ pub(super) fn for_shapes(function: &Function, shapes: &[Shape]) -> String {
             "take the length norm(v) or a component v.x of the vector".into()
         }
         ("+" | "-", [Vector(_), Vector(_)]) => "give both the same number of components, as in vector(x, y, 0)".into(),
+        ("+" | "-" | "*", [Quat | DualQuat | Motion, Vector(3)]) => {
+            "turn a vector by rotate(q, v), move a point by transform(a, p)".into()
+        }
         ("+" | "-", _) => "bring both sides to the same shape".into(),
         ("<" | "<=" | ">" | ">=" | "==" | "!=", _) => {
             "compare numbers: lengths norm(v), components v.x, or entries M[0][1]".into()

@@ -95,6 +95,24 @@ impl Signature {
         signature
     }
 
+    /// Returns the type of a group of inputs. An array with an invalid length gets length one. Lengths may be those of
+    /// other arrays.
+    fn input_type(
+        &self,
+        group: &InputGroup,
+        declaration: &str,
+        globals: &Globals,
+        diagnostics: &mut Diagnostics,
+    ) -> InputType {
+        let length = group.length.as_ref().map(|length| {
+            let signature = Self { names: self.names.clone(), ..Self::empty() };
+            let mut checker = Checker::new(&signature, globals, &[], &globals.budget, diagnostics);
+            checker.declaration = declaration;
+            checker.array_length(&group.names[0], length).unwrap_or(1)
+        });
+        InputType { element: group.element, length }
+    }
+
     fn add_group(
         &mut self,
         declaration: &Declaration,
@@ -103,7 +121,7 @@ impl Signature {
         velocities: &mut usize,
         diagnostics: &mut Diagnostics,
     ) {
-        let input_type = input_type(group, &declaration.name.text, globals, diagnostics);
+        let input_type = self.input_type(group, &declaration.name.text, globals, diagnostics);
         // Each has at least one number, so that this error is certain.
         for name in group.names.iter().take(MOST_NUMBERS + 1 - self.names.len().min(MOST_NUMBERS)) {
             self.add(name, group, input_type, velocities, diagnostics);
@@ -198,10 +216,15 @@ impl Signature {
             let suffix = if stored && reserved(&name.text).is_some() { "_" } else { "" };
             let (name, unit, shared) = (format!("{}{suffix}", name.text), unit.text.clone(), *shared);
             let input = Input { name, input_type, unit, span, first, shared };
-            match length.filter(|_| section == Section::Moving) {
-                // Moving inputs are listed entry by entry.
-                Some(length) => list.extend((0..length).map(|i| entry(&input, i))),
-                None => list.push(input),
+            if section == Section::Moving {
+                // Moving inputs are listed entry by entry, and motions part by part.
+                let entries: Vec<Input> = match length {
+                    Some(length) => (0..length).map(|i| entry(&input, i)).collect(),
+                    None => vec![input],
+                };
+                list.extend(entries.into_iter().flat_map(unknowns));
+            } else {
+                list.push(input);
             }
             (source, first)
         };
@@ -219,7 +242,7 @@ fn check_group(declaration: &Declaration, group: &InputGroup, diagnostics: &mut 
     let is_unknown = group.section == Section::Moving && group.element != ElementType::Velocity;
     if is_unknown && declaration.kind != Kind::Residual && !moves_by_numbers(group.element) {
         let message = format!("an unknown of this {kind} cannot have this type");
-        let help = "unknowns are Scalar, Vec2, Vec3, Vec4, Point, Point2, Rotation and arrays of them; parameters \
+        let help = "unknowns are Scalar, Vec2, Vec3, Vec4, Point, Point2, Rotation, Motion and arrays of them; parameters \
                     follow the first `;`, as in (p0, p1: Point; k: Scalar)";
         report(message, help);
     }
@@ -236,8 +259,8 @@ fn check_group(declaration: &Declaration, group: &InputGroup, diagnostics: &mut 
 
 /// Returns whether an unknown of this type moves by three numbers or fewer that are added, or by a rotation.
 fn moves_by_numbers(element: ElementType) -> bool {
-    use ElementType::{Point, Point2, Rotation, Scalar, Vector};
-    matches!(element, Scalar | Vector(_) | Point | Point2 | Rotation)
+    use ElementType::{Motion, Point, Point2, Rotation, Scalar, Vector};
+    matches!(element, Scalar | Vector(_) | Point | Point2 | Rotation | Motion)
 }
 
 /// Maximum count of numbers in an input; more are data.
@@ -246,22 +269,26 @@ const MOST_NUMBERS: usize = 4096;
 /// Maximum count of coordinates of an energy, a constraint or a force, whose second derivatives have their square.
 const MOST_COORDINATES: usize = 255;
 
-/// Returns the type of a group of inputs. An array with an invalid length gets length one.
-fn input_type(group: &InputGroup, declaration: &str, globals: &Globals, diagnostics: &mut Diagnostics) -> InputType {
-    let length = group.length.as_ref().map(|length| {
-        let signature = Signature::empty();
-        let mut checker = Checker::new(&signature, globals, &[], &globals.budget, diagnostics);
-        checker.declaration = declaration;
-        checker.array_length(&group.names[0], length).unwrap_or(1)
-    });
-    InputType { element: group.element, length }
-}
-
 /// Returns entry `number` of an array as a separate input.
 fn entry(array: &Input, number: usize) -> Input {
     let input_type = InputType { element: array.input_type.element, length: None };
     let first = array.first + number * input_type.size();
     Input { name: format!("{}[{number}]", array.name), input_type, first, ..array.clone() }
+}
+
+/// Returns the unknowns that an input consists of: a motion is a point and a rotation.
+fn unknowns(input: Input) -> Vec<Input> {
+    if input.input_type.element != ElementType::Motion {
+        return vec![input];
+    }
+    let part = |element: ElementType, ending: &str, offset: usize| Input {
+        name: format!("{}.{ending}", input.name),
+        input_type: InputType { element, length: None },
+        first: input.first + offset,
+        unit: String::new(),
+        ..input.clone()
+    };
+    vec![part(ElementType::Point, "position", 0), part(ElementType::Rotation, "rotation", 3)]
 }
 
 /// Returns the shape of an input, or of the entries of an array.
@@ -273,6 +300,7 @@ pub(super) fn shape_of(element: ElementType) -> Shape {
         ElementType::Vector(n) => Shape::Vector(n),
         ElementType::Matrix(rows, columns) => Shape::Matrix(rows, columns),
         ElementType::Quat | ElementType::Rotation => Shape::Quat,
+        ElementType::Motion => Shape::Motion,
         ElementType::DualQuat => Shape::DualQuat,
         ElementType::Twist => Shape::Twist,
     }
@@ -280,7 +308,7 @@ pub(super) fn shape_of(element: ElementType) -> Shape {
 
 /// Returns why a name would clash in the generated constructor; `None` if it would not.
 fn reserved(name: &str) -> Option<&'static str> {
-    let is_temporary = name.strip_prefix('t').is_some_and(|n| !n.is_empty() && n.bytes().all(|b| b.is_ascii_digit()));
+    let is_temporary = name.strip_prefix("__").is_some_and(|n| !n.is_empty() && n.bytes().all(|b| b.is_ascii_digit()));
     if syn::parse_str::<syn::Ident>(name).is_err() {
         return Some("it is a word of Rust");
     }

@@ -1,8 +1,7 @@
 //! The unknowns of a declaration: which numbers hold them, and in which coordinates they move.
 
 use crate::check::Input as DeclaredInput;
-use crate::graph::{Graph, Input, NodeId, Op, Primitive, Rule, symmetric_index};
-use crate::syntax::ElementType;
+use crate::graph::{Graph, Input, NodeId, Op, Origin, Primitive, Rule, symmetric_index};
 use energy_runtime::FieldKind;
 
 /// One unknown: a point, a number, a rotation, ….
@@ -141,13 +140,6 @@ pub fn by_increments(g: &mut Graph, first: usize, by_numbers: &[NodeId]) -> Vec<
     (0..3).map(of_axis).collect()
 }
 
-impl ElementType {
-    /// Returns whether an unknown of this type is a rotation.
-    pub(crate) fn is_rotation(self) -> bool {
-        self.field_kind() == FieldKind::Rotation
-    }
-}
-
 /// Returns the components of exp(δ) q at δ = 0, where q are four numbers of the unknowns from `first` on and δ three
 /// increments. exp(δ) = (1 − |δ|²/8, δ/2) up to second order, so
 ///
@@ -185,5 +177,6 @@ fn turned(g: &mut Graph, first: usize, first_increment: usize) -> Vec<NodeId> {
             }
         });
     }
+    g.note_origin(&parts, Origin::UnitQuaternion);
     parts
 }

@@ -91,7 +91,7 @@ impl Names {
         let name = |op: &Op| match *op {
             Op::Input(input) => read(input),
             _ => {
-                let name = format_ident!("t{}", computed.next().unwrap_or(usize::MAX));
+                let name = format_ident!("__{}", computed.next().unwrap_or(usize::MAX));
                 quote!(#name)
             }
         };

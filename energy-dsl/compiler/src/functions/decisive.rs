@@ -30,6 +30,7 @@ mod tests {
         Shape::Matrix(3, 3),
         Shape::Matrix(4, 4),
         Shape::Quat,
+        Shape::Motion,
         Shape::DualQuat,
         Shape::Twist,
         Shape::Truth,

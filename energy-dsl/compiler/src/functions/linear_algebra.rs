@@ -4,6 +4,7 @@ use super::angle::recognise_cosine;
 use super::arithmetic::scaled;
 use super::inner_product::inner_product;
 use super::polar::recognise_stretch_trace;
+use super::quaternion::inverse_motion;
 use super::rotated::recognise_rotated_product;
 use super::spatial_polar::distance_to_rotation;
 use super::{Function, Lowered, Shape, Units};
@@ -79,10 +80,13 @@ pub(super) const FUNCTIONS: &[Function] = &[
     Function {
         name: "inverse",
         usage: "inverse(A)",
-        docs: "Inverse of a 2×2, 3×3 or 4×4 matrix.",
-        shape: square_to_square,
+        docs: "Inverse of a 2×2, 3×3 or 4×4 matrix, or of a motion.",
+        shape: |shapes| if shapes == [Shape::Motion] { Ok(Shape::Motion) } else { square_to_square(shapes) },
         units: Units::Power(-1.0),
-        lower: inverse,
+        lower: |g, a| match a[0].shape {
+            Shape::Motion => inverse_motion(g, &a[0]),
+            _ => inverse(g, a),
+        },
         accuracy: "",
     },
     Function {

@@ -28,6 +28,7 @@ mod sinc;
 mod singular;
 mod spatial_polar;
 mod trigonometric;
+mod turned;
 mod units;
 
 pub use shape::{Lowered, Shape};

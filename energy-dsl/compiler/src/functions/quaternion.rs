@@ -6,6 +6,7 @@
 
 use super::length::direction;
 use super::sinc::{assume_at_most_a_quarter_turn, cos_sqrt, sinc_sqrt};
+use super::turned::turn;
 use super::{Function, Lowered, Shape, Units};
 use crate::graph::{Form, Graph, NodeId, Origin, Primitive, Rule, upper};
 use energy_runtime::Flag;
@@ -95,19 +96,21 @@ pub(super) const FUNCTIONS: &[Function] = &[
     Function {
         name: "rotate",
         usage: "rotate(q, v)",
-        docs: "q v q*: rotates the vector v by a unit quaternion, or by the unit real part of a dual quaternion.",
+        docs: "q v q*: rotates the vector v by a unit quaternion, by the unit real part of a dual quaternion, or by a \
+             motion.",
         shape: rotate_shape,
         units: Units::Rotated,
-        lower: |g, a| Lowered::vector(rotate(g, &a[0].parts[..4], &a[1].parts)),
+        lower: |g, a| Lowered::vector(rotate(g, turning(&a[0]), &a[1].parts)),
         accuracy: "",
     },
     Function {
         name: "transform",
         usage: "transform(q, p)",
-        docs: "Moves the point p by a dual quaternion with unit real part: a rotation by real(q), then a translation \
-             by the vector part of 2 dual(q) real(q)*.",
-        shape: |s| {
-            exactly(s, &[Shape::DualQuat, Shape::Vector(3)], Shape::Vector(3), "takes a dual quaternion and a 3-vector")
+        docs: "Moves the point p: by a motion, or by a dual quaternion with unit real part, which is a rotation by \
+             real(q), then a translation by the vector part of 2 dual(q) real(q)*.",
+        shape: |s| match *s {
+            [Shape::Motion | Shape::DualQuat, Shape::Vector(3)] => Ok(Shape::Vector(3)),
+            _ => Err("takes a motion or a dual quaternion, and a 3-vector".into()),
         },
         units: Units::Transformed,
         lower: transform,
@@ -115,13 +118,28 @@ pub(super) const FUNCTIONS: &[Function] = &[
     },
     Function {
         name: "rotation",
-        usage: "rotation(θ)",
+        usage: "rotation(θ) or rotation(a)",
         docs: "The unit quaternion (cos ‖θ‖, θ sin ‖θ‖/‖θ‖) of half a rotation vector θ: it rotates by 2‖θ‖. Regular \
-             at θ = 0.",
-        shape: |s| exactly(s, &[Shape::Vector(3)], Shape::Quat, "takes a 3-vector"),
+             at θ = 0. Of a motion a, its rotation.",
+        shape: |s| match *s {
+            [Shape::Vector(3) | Shape::Motion] => Ok(Shape::Quat),
+            _ => Err("takes a 3-vector or a motion".into()),
+        },
         units: Units::Orientation,
-        lower: |g, a| quaternion(&rotation(g, &a[0].parts)),
+        lower: |g, a| match a[0].shape {
+            Shape::Motion => quaternion(turning(&a[0])),
+            _ => quaternion(&rotation(g, &a[0].parts)),
+        },
         accuracy: "",
+    },
+    Function {
+        name: "position",
+        usage: "position(a)",
+        docs: "The position of a motion, where it takes the origin.",
+        shape: |s| exactly(s, &[Shape::Motion], Shape::Vector(3), "takes a motion"),
+        units: Units::SecondPart,
+        lower: |_, a| Lowered::vector(&a[0].parts[..3]),
+        accuracy: "0",
     },
     Function {
         name: "rotation_matrix",
@@ -168,8 +186,8 @@ fn conjugate_shape(shapes: &[Shape]) -> Result<Shape, String> {
 
 fn rotate_shape(shapes: &[Shape]) -> Result<Shape, String> {
     match *shapes {
-        [Shape::Quat | Shape::DualQuat, Shape::Vector(3)] => Ok(Shape::Vector(3)),
-        _ => Err("takes a quaternion or a dual quaternion, and a 3-vector".into()),
+        [Shape::Quat | Shape::DualQuat | Shape::Motion, Shape::Vector(3)] => Ok(Shape::Vector(3)),
+        _ => Err("takes a quaternion, a dual quaternion or a motion, and a 3-vector".into()),
     }
 }
 
@@ -225,12 +243,12 @@ pub(super) fn product(g: &mut Graph, a: &Lowered, b: &Lowered) -> Lowered {
 
 /// Returns v + 2 (w t + u × t) with q = (w, u) and t = u × v.
 fn rotate(g: &mut Graph, q: &[NodeId], v: &[NodeId]) -> Vec<NodeId> {
-    let rotated = rotated(g, q, v);
+    let rotated = turn(g, q, v).unwrap_or_else(|| rotated(g, q, v));
     g.note_origin(&rotated, Origin::Rotated { quaternion: q.to_vec(), vector: v.to_vec() });
     rotated
 }
 
-fn rotated(g: &mut Graph, q: &[NodeId], v: &[NodeId]) -> Vec<NodeId> {
+pub(super) fn rotated(g: &mut Graph, q: &[NodeId], v: &[NodeId]) -> Vec<NodeId> {
     let t = if g.form() == Form::Textbook { g.cross(&q[1..], v) } else { g.fused_cross(&q[1..], v) };
     let (two, along) = (g.constant(2.0), g.scaled(q[0], &t));
     let half = plus_cross(g, &along, &q[1..], &t);
@@ -238,8 +256,30 @@ fn rotated(g: &mut Graph, q: &[NodeId], v: &[NodeId]) -> Vec<NodeId> {
     v.iter().zip(added).map(|(&v, added)| g.add(v, added)).collect()
 }
 
+/// Returns the quaternion that a value rotates by.
+fn turning(value: &Lowered) -> &[NodeId] {
+    match value.shape {
+        Shape::Motion => &value.parts[3..],
+        _ => &value.parts[..4],
+    }
+}
+
+/// Returns the inverse of a motion: p ↦ R* (p − x).
+pub(super) fn inverse_motion(g: &mut Graph, motion: &Lowered) -> Lowered {
+    let back = conjugate(g, &[quaternion(turning(motion))]);
+    let turned = rotate(g, &back.parts, &motion.parts[..3]);
+    let mut parts: Vec<NodeId> = turned.into_iter().map(|part| g.neg(part)).collect();
+    parts.extend(back.parts);
+    Lowered { shape: Shape::Motion, parts }
+}
+
 /// Rotates, and translates by w e − w′ u + u × e, with the real part (w, u) and twice the dual part, (w′, e).
 fn transform(g: &mut Graph, a: &[Lowered]) -> Lowered {
+    if a[0].shape == Shape::Motion {
+        let turned = rotate(g, turning(&a[0]), &a[1].parts);
+        let moved = a[0].parts[..3].iter().zip(turned).map(|(&x, turned)| g.add(x, turned));
+        return Lowered::vector(moved.collect::<Vec<_>>());
+    }
     let (q, dual) = a[0].parts.split_at(4);
     let turned = rotated(g, q, &a[1].parts);
     let two = g.constant(2.0);

@@ -13,6 +13,8 @@ pub enum Shape {
     Matrix(u8, u8),
     /// A quaternion: w, x, y, z.
     Quat,
+    /// A position, then a rotation as a quaternion.
+    Motion,
     /// A dual quaternion: real part, then dual part.
     DualQuat,
     /// A twist: rotation vector, then translation.
@@ -34,6 +36,7 @@ impl Shape {
             Self::Vector(n) => n.into(),
             Self::Matrix(r, c) => usize::from(r) * usize::from(c),
             Self::Quat => 4,
+            Self::Motion => 7,
             Self::DualQuat => 8,
             Self::Twist => 6,
             Self::Array(n) | Self::Rows(n) => usize::from(n),
@@ -49,6 +52,7 @@ impl fmt::Display for Shape {
             Self::Matrix(r, c) => write!(f, "a {r}×{c} matrix"),
             Self::Truth => f.write_str("a comparison"),
             Self::Quat => f.write_str("a quaternion"),
+            Self::Motion => f.write_str("a motion"),
             Self::DualQuat => f.write_str("a dual quaternion"),
             Self::Twist => f.write_str("a twist"),
             Self::Array(n) => write!(f, "an array of {n}"),

@@ -95,6 +95,13 @@ pub enum Primitive {
     Spectral,
     /// A component of the quaternion exp(δ) q at δ = 0.
     Turned(u8),
+    /// A component of a vector that such a quaternion turns.
+    TurnedVector {
+        /// The component.
+        axis: u8,
+        /// Whether the quaternion is the conjugate.
+        backwards: bool,
+    },
     /// A number y in place of its definition x, which has the same value. The arguments are y and x. If `slopes`, first
     /// derivatives are those of y, too.
     ComputedAs {
@@ -166,7 +173,8 @@ impl Primitive {
             | Self::Partial { .. }
             | Self::SincSqrtSlope
             | Self::ComputedAs { .. }
-            | Self::Turned(_) => return None,
+            | Self::Turned(_)
+            | Self::TurnedVector { .. } => return None,
         })
     }
 }
@@ -302,7 +310,7 @@ impl Graph {
         let value = self.product(None, &rule.first[by]);
         let n = rule.arguments.len();
         let Some(second) = &rule.second else { return value };
-        if matches!(rule.primitive, Primitive::Turned(_)) {
+        if matches!(rule.primitive, Primitive::Turned(_) | Primitive::TurnedVector { .. }) {
             // A rotation by δ after another one: not the second derivative of their sum.
             return value;
         }

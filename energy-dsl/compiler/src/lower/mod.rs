@@ -298,15 +298,15 @@ impl<'a> Lowering<'a> {
             TypedKind::Constant(value) => Lowered::scalar(self.graph.constant(*value)),
             TypedKind::Pi => Lowered::scalar(self.graph.pi()),
             TypedKind::Input(source, first) => {
-                let rotation = match (source, self.graph.form()) {
-                    // Derivatives are by its increments. Whoever evaluates the textbook form moves it otherwise.
-                    (Source::Position, Form::Robust) => self.unknowns.rotation(&mut self.graph, *first),
-                    _ => None,
-                };
-                match rotation {
-                    Some(parts) => Lowered { shape: expression.shape, parts },
-                    None => self.inputs(expression.shape, *first, input_of(*source)),
+                let mut value = self.inputs(expression.shape, *first, input_of(*source));
+                // Derivatives are by its increments. Whoever evaluates the textbook form moves it otherwise.
+                if *source == Source::Position && self.graph.form() == Form::Robust {
+                    let before = if expression.shape == Shape::Motion { 3 } else { 0 };
+                    if let Some(rotation) = self.unknowns.rotation(&mut self.graph, first + before) {
+                        value.parts.splice(before.., rotation);
+                    }
                 }
+                value
             }
             TypedKind::Binding(number) => self.binding(*number),
             TypedKind::Call(function, arguments) => {

@@ -30,6 +30,12 @@ impl Hazards {
         *flags = Some(flags.map_or(mask, |other| g.or(other, mask)));
     }
 
+    /// Marks where the formula has no limit.
+    pub(super) fn never(&mut self, g: &mut Graph, mask: NodeId) {
+        self.flag(g, Flag::Degenerate, mask);
+        self.definite = Some(self.definite.map_or(mask, |other| g.or(other, mask)));
+    }
+
     fn require(&mut self, g: &mut Graph, mask: NodeId) {
         self.sound = Some(self.sound.map_or(mask, |other| g.and(other, mask)));
     }

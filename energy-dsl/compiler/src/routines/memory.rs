@@ -17,12 +17,12 @@ pub(super) fn routines(
 ) -> Vec<Apart> {
     let Formula { graph: mut of_next, outputs: next, .. } = next;
     let list = after_step(&mut of_next, program, unknowns, &next, routes);
-    let mut apart = vec![Apart::new(of_next, list)];
+    let mut apart = vec![Apart::new(of_next, list, unknowns)];
     // A force may depend on velocities, which these routines do not take.
     if program.kind != Kind::Force {
         let Formula { graph, outputs, .. } = formula;
         let (graph, by_state) = slopes_by_state(graph, program, unknowns, &outputs, routes);
-        apart.push(Apart::new(graph, vec![by_state]));
+        apart.push(Apart::new(graph, vec![by_state], unknowns));
     }
     apart
 }

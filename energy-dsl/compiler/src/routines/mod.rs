@@ -16,7 +16,7 @@ use crate::diff::{
 };
 use crate::graph::{Graph, Input, NodeId, Op, count, general, ordinary, with_signs_inside};
 use crate::lower::{Formula, LoweredProgram, Repetition, RestFormula};
-use energy_runtime::{Flag, Kind, OperationCount, RoutineKind};
+use energy_runtime::{FieldKind, Flag, Kind, OperationCount, RoutineKind};
 use hazards::{Hazards, hazards, operations};
 use range::Tests;
 
@@ -68,6 +68,9 @@ impl Routine {
     }
 }
 
+/// The largest error of a rotation's length.
+const UNIT_TOLERANCE: f64 = 1e-6;
+
 /// A routine before it is split into its ordinary and its general path.
 struct Whole {
     kind: RoutineKind,
@@ -115,6 +118,22 @@ impl Whole {
         let tests = Tests::of(g, guards, derivatives);
         guards.extend(tests.guards(g));
         tests.finite(g, values)
+    }
+
+    /// Flags rotations whose quaternions are not of unit length. Nothing has a limit there.
+    fn flagged_off_unit(mut self, g: &mut Graph, unknowns: &Unknowns) -> Self {
+        for rotation in unknowns.list.iter().filter(|unknown| unknown.kind == FieldKind::Rotation) {
+            let numbers = rotation.first_number..rotation.first_number + 4;
+            let q: Vec<NodeId> = numbers.map(|number| g.input(Input::Position(Budget::input_number(number)))).collect();
+            let (square, one) = (g.dot(&q, &q), g.constant(1.0));
+            let excess = g.sub(square, one);
+            let (excess, most) = (g.abs(excess), g.constant(2.0 * UNIT_TOLERANCE));
+            let is_unit = g.less_or_equal(excess, most);
+            // Also true of NaN.
+            let off = g.not(is_unit);
+            self.hazards.never(g, off);
+        }
+        self
     }
 
     fn split(self, g: &mut Graph) -> Routine {
@@ -274,12 +293,12 @@ pub fn differentiate(
     let primitives = primitives(g, &outputs, &list);
     let mut apart = Vec::new();
     if program.vertices && !is_mixed {
-        apart.push(Apart::of_vertices(g, list[0].groups[0][0], &coordinates, program.points(), &mut routes));
+        apart.push(Apart::of_vertices(g, list[0].groups[0][0], &coordinates, &unknowns, &mut routes));
     }
     if let Some(memory) = memory {
         apart.extend(memory::routines(program, &unknowns, memory, &mut routes));
     }
-    let list = list.into_iter().map(|whole| whole.split(g)).collect();
+    let list = list.into_iter().map(|whole| whole.flagged_off_unit(g, &unknowns).split(g)).collect();
     Routines {
         rest,
         refused,
@@ -359,8 +378,9 @@ pub struct Apart {
 }
 
 impl Apart {
-    fn new(mut graph: Graph, list: Vec<Whole>) -> Self {
-        let list = list.into_iter().map(|whole| whole.split(&mut graph)).collect();
+    fn new(mut graph: Graph, list: Vec<Whole>, unknowns: &Unknowns) -> Self {
+        let split = |whole: Whole| whole.flagged_off_unit(&mut graph, unknowns).split(&mut graph);
+        let list = list.into_iter().map(split).collect();
         Self { graph, list }
     }
 
@@ -369,12 +389,12 @@ impl Apart {
         graph: &Graph,
         value: NodeId,
         coordinates: &Coordinates,
-        points: usize,
+        unknowns: &Unknowns,
         routes: &mut Vec<Routes>,
     ) -> Self {
         let mut graph = graph.clone();
-        let list = vertices(&mut graph, value, coordinates, points, routes);
-        Self::new(graph, list)
+        let list = vertices(&mut graph, value, coordinates, unknowns.list.len(), routes);
+        Self::new(graph, list, unknowns)
     }
 }
 

@@ -124,6 +124,8 @@ pub enum ElementType {
     Quat,
     /// A rotation, a unit quaternion: w, x, y, z.
     Rotation,
+    /// A position in space, then a rotation: x, y, z, then w, x, y, z.
+    Motion,
     /// A dual quaternion: real part, then dual part, each w, x, y, z.
     DualQuat,
     /// A rotation vector θ, then a translation t.
@@ -141,6 +143,7 @@ impl ElementType {
             Self::Vector(n) => vec![n.into()],
             Self::Matrix(rows, columns) => vec![rows.into(), columns.into()],
             Self::Quat | Self::Rotation => vec![4],
+            Self::Motion => vec![7],
             Self::DualQuat => vec![8],
             Self::Twist => vec![6],
         }
@@ -160,6 +163,12 @@ impl ElementType {
             Self::Rotation => FieldKind::Rotation,
             _ => FieldKind::Numbers,
         }
+    }
+
+    /// Returns whether an unknown of this type is a rotation.
+    #[must_use]
+    pub fn is_rotation(self) -> bool {
+        self.field_kind() == FieldKind::Rotation
     }
 
     /// Returns the number of coordinates in which an unknown of this type moves.

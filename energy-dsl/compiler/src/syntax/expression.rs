@@ -20,7 +20,7 @@ impl<'a> Parser<'a> {
     /// Parses left-associative operators, by increasing precedence.
     fn binary(&mut self, level: usize) -> Parsed<Expression> {
         const LEVELS: &[&[&str]] =
-            &[&["||"], &["&&"], &["<", "<=", ">", ">=", "==", "!="], &["+", "-"], &["*", "/", "·", "×", "⊗"]];
+            &[&["||"], &["&&"], &["<", "<=", ">", ">=", "==", "!="], &["+", "-"], &["*", "/", "%", "·", "×", "⊗"]];
         let Some(operators) = LEVELS.get(level) else { return self.unary() };
         let mut left = self.binary(level + 1)?;
         for length in 0.. {

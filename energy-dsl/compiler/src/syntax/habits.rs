@@ -135,7 +135,7 @@ pub(super) fn symbol(symbol: &str) -> Option<&'static str> {
         "#" => Some("comments begin with `//`"),
         "=" => Some("compare with `==`, and define a name with `let name = …;`"),
         "!" => Some("write the opposite comparison, as in a >= b for !(a < b)"),
-        "&" | "%" => Some("formulas have + - * / ^, comparisons, && and ||"),
+        "&" => Some("formulas have + - * / ^, comparisons, && and ||"),
         _ => None,
     }
 }

@@ -5,6 +5,7 @@ mod attribute;
 pub(crate) mod characters;
 mod expression;
 pub(crate) mod habits;
+mod lengths;
 mod name;
 mod notation;
 mod parse;

@@ -99,8 +99,8 @@ impl Lexer<'_> {
             '⅛' => self.push(Kind::Number(0.125), start),
             'ᵀ' => self.symbol("ᵀ", start),
             '∞' => self.push(Kind::Name("infinity".into()), start),
-            '√' | '‖' | '|' | '+' | '-' | '*' | '/' | '^' | '(' | ')' | '[' | ']' | '{' | '}' | ',' | ';' | ':'
-            | '=' | '<' | '>' | '!' | '&' | '.' => {
+            '√' | '‖' | '|' | '+' | '-' | '*' | '/' | '%' | '^' | '(' | ')' | '[' | ']' | '{' | '}' | ',' | ';'
+            | ':' | '=' | '<' | '>' | '!' | '&' | '.' => {
                 let mut symbol = c.to_string();
                 if let Some(next) = self.peek() {
                     let pair = format!("{c}{next}");

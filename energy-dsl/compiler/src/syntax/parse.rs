@@ -8,6 +8,7 @@ use super::ast::{
 };
 use super::attribute::Attributes;
 use super::habits;
+use super::lengths;
 use super::name::Name;
 use super::specialise::{Specialisation, specialise};
 use super::text;
@@ -23,7 +24,7 @@ pub fn parse(stream: TokenStream, diagnostics: &mut Diagnostics) -> Vec<Item> {
         diagnostics.push(Diagnostic::new(&beyond.span, message).help("split it into several texts"));
         return Vec::new();
     }
-    items(&tokens, diagnostics)
+    items(&lengths::expand(tokens, diagnostics), diagnostics)
 }
 
 /// Parses the text of a file. `at` is the place in Rust code that names the file.
@@ -33,7 +34,7 @@ pub fn parse_file(text: &str, file: &str, at: &Span, diagnostics: &mut Diagnosti
         return Vec::new();
     }
     let tokens = text::tokens(text, file, at);
-    items(&tokens, diagnostics)
+    items(&lengths::expand(tokens, diagnostics), diagnostics)
 }
 
 /// Maximum number of definitions in a text.
@@ -111,6 +112,7 @@ const TYPES: &[(&str, ElementType)] = &[
     ("Mat4x4", ElementType::Matrix(4, 4)),
     ("Quat", ElementType::Quat),
     ("Rotation", ElementType::Rotation),
+    ("Motion", ElementType::Motion),
     ("DualQuat", ElementType::DualQuat),
     ("Twist", ElementType::Twist),
 ];
@@ -620,6 +622,11 @@ fn section_of(section: Section, element: ElementType) -> Section {
         ElementType::Velocity => Section::Moving,
         _ => section,
     }
+}
+
+/// Returns whether a word begins a declaration.
+pub(super) fn is_kind_of_declaration(word: &str) -> bool {
+    KINDS.iter().any(|kind| kind.keyword() == word)
 }
 
 /// Returns whether a word is reserved by the language.

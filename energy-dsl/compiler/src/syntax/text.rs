@@ -165,7 +165,7 @@ impl Lexer<'_> {
             self.take_while(|c| c != '\n');
             return;
         }
-        if !"#[](){}<>=!&|+-*/^,;:.".contains(c) {
+        if !"#[](){}<>=!&|+-*/%^,;:.".contains(c) {
             let (message, help) = characters::misplaced(c);
             let help = help.or_else(|| super::habits::symbol(&symbol).map(str::to_owned));
             let help = help.unwrap_or_else(|| "put mathematical notation in a string: \"‖p − q‖ − L\"".into());

@@ -1,10 +1,10 @@
-//! Dimensions: powers of kilogram, metre and second, known or not yet known.
+//! Dimensions: powers of kilogram, metre, second and kelvin, known or not yet known.
 
 use std::collections::BTreeMap;
 use std::fmt;
 
-/// Exponents of kg, m and s.
-type Exponents = [f64; 3];
+/// Exponents of kg, m, s and K.
+type Exponents = [f64; 4];
 
 /// A product of powers of base units and unknown dimensions.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -21,22 +21,24 @@ pub(super) fn is_zero(exponent: f64) -> bool {
     exponent.abs() < TOLERANCE
 }
 
-pub(super) const NUMBER: Exponents = [0.0, 0.0, 0.0];
-pub(super) const LENGTH: Exponents = [0.0, 1.0, 0.0];
-pub(super) const VELOCITY: Exponents = [0.0, 1.0, -1.0];
-pub(super) const FORCE: Exponents = [1.0, 1.0, -2.0];
-pub(super) const ENERGY: Exponents = [1.0, 2.0, -2.0];
+pub(super) const NUMBER: Exponents = [0.0, 0.0, 0.0, 0.0];
+pub(super) const LENGTH: Exponents = [0.0, 1.0, 0.0, 0.0];
+pub(super) const VELOCITY: Exponents = [0.0, 1.0, -1.0, 0.0];
+pub(super) const FREQUENCY: Exponents = [0.0, 0.0, -1.0, 0.0];
+pub(super) const FORCE: Exponents = [1.0, 1.0, -2.0, 0.0];
+pub(super) const ENERGY: Exponents = [1.0, 2.0, -2.0, 0.0];
 
 /// Units that a text can use.
 const UNITS: &[(&str, Exponents)] = &[
-    ("kg", [1.0, 0.0, 0.0]),
+    ("kg", [1.0, 0.0, 0.0, 0.0]),
     ("m", LENGTH),
-    ("s", [0.0, 0.0, 1.0]),
+    ("s", [0.0, 0.0, 1.0, 0.0]),
     ("N", FORCE),
     ("J", ENERGY),
-    ("Pa", [1.0, -1.0, -2.0]),
-    ("W", [1.0, 2.0, -3.0]),
-    ("Hz", [0.0, 0.0, -1.0]),
+    ("Pa", [1.0, -1.0, -2.0, 0.0]),
+    ("W", [1.0, 2.0, -3.0, 0.0]),
+    ("Hz", [0.0, 0.0, -1.0, 0.0]),
+    ("K", [0.0, 0.0, 0.0, 1.0]),
     ("rad", NUMBER),
     ("1", NUMBER),
 ];
@@ -44,23 +46,24 @@ const UNITS: &[(&str, Exponents)] = &[
 /// Names and units of common quantities, for messages.
 const QUANTITIES: &[(&str, &str, Exponents)] = &[
     ("a number", "1", NUMBER),
-    ("a mass", "kg", [1.0, 0.0, 0.0]),
+    ("a mass", "kg", [1.0, 0.0, 0.0, 0.0]),
     ("a length", "m", LENGTH),
-    ("a time", "s", [0.0, 0.0, 1.0]),
-    ("an area", "m²", [0.0, 2.0, 0.0]),
-    ("a volume", "m³", [0.0, 3.0, 0.0]),
+    ("a time", "s", [0.0, 0.0, 1.0, 0.0]),
+    ("a temperature", "K", [0.0, 0.0, 0.0, 1.0]),
+    ("an area", "m²", [0.0, 2.0, 0.0, 0.0]),
+    ("a volume", "m³", [0.0, 3.0, 0.0, 0.0]),
     ("a velocity", "m/s", VELOCITY),
-    ("an acceleration", "m/s²", [0.0, 1.0, -2.0]),
+    ("an acceleration", "m/s²", [0.0, 1.0, -2.0, 0.0]),
     ("a force", "N", FORCE),
     ("an energy", "J", ENERGY),
-    ("a power", "W", [1.0, 2.0, -3.0]),
-    ("a pressure", "Pa", [1.0, -1.0, -2.0]),
-    ("a stiffness", "N/m", [1.0, 0.0, -2.0]),
-    ("a damping", "N·s/m", [1.0, 0.0, -1.0]),
-    ("a frequency", "1/s", [0.0, 0.0, -1.0]),
-    ("a curvature", "1/m", [0.0, -1.0, 0.0]),
-    ("a density", "kg/m³", [1.0, -3.0, 0.0]),
-    ("a mass for an area", "kg/m²", [1.0, -2.0, 0.0]),
+    ("a power", "W", [1.0, 2.0, -3.0, 0.0]),
+    ("a pressure", "Pa", [1.0, -1.0, -2.0, 0.0]),
+    ("a stiffness", "N/m", [1.0, 0.0, -2.0, 0.0]),
+    ("a damping", "N·s/m", [1.0, 0.0, -1.0, 0.0]),
+    ("a frequency", "1/s", [0.0, 0.0, -1.0, 0.0]),
+    ("a curvature", "1/m", [0.0, -1.0, 0.0, 0.0]),
+    ("a density", "kg/m³", [1.0, -3.0, 0.0, 0.0]),
+    ("a mass for an area", "kg/m²", [1.0, -2.0, 0.0, 0.0]),
 ];
 
 impl Dimension {
@@ -108,7 +111,7 @@ impl fmt::Display for Dimension {
         if let Some((name, unit, _)) = QUANTITIES.iter().find(|(_, _, exponents)| same(exponents)) {
             return write!(f, "{name} ({unit})");
         }
-        let factors: Vec<String> = ["kg", "m", "s"]
+        let factors: Vec<String> = ["kg", "m", "s", "K"]
             .iter()
             .zip(self.base)
             .filter(|(_, exponent)| !is_zero(*exponent))
@@ -274,17 +277,18 @@ mod tests {
     #[test]
     fn units_are_products_of_powers() {
         for (text, expected) in [
-            ("N/m", [1.0, 0.0, -2.0]),
+            ("N/m", [1.0, 0.0, -2.0, 0.0]),
             ("N m", ENERGY),
             ("kg·m²/s²", ENERGY),
             ("kg m^2 / s^2", ENERGY),
-            ("N s/m", [1.0, 0.0, -1.0]),
-            ("J/(m s)", [1.0, 1.0, -3.0]),
-            ("1/s", [0.0, 0.0, -1.0]),
-            ("m^(1/2)", [0.0, 0.5, 0.0]),
-            ("m⁻¹ Pa", [1.0, -2.0, -2.0]),
-            ("Hz rad", [0.0, 0.0, -1.0]),
-            ("m^-2", [0.0, -2.0, 0.0]),
+            ("N s/m", [1.0, 0.0, -1.0, 0.0]),
+            ("J/(m s)", [1.0, 1.0, -3.0, 0.0]),
+            ("1/s", [0.0, 0.0, -1.0, 0.0]),
+            ("m^(1/2)", [0.0, 0.5, 0.0, 0.0]),
+            ("m⁻¹ Pa", [1.0, -2.0, -2.0, 0.0]),
+            ("Hz rad", [0.0, 0.0, -1.0, 0.0]),
+            ("m^-2", [0.0, -2.0, 0.0, 0.0]),
+            ("J/(kg K)", [0.0, 2.0, -2.0, -1.0]),
         ] {
             assert_eq!(parse(text).unwrap(), Dimension::of(expected), "{text}");
         }

@@ -1,14 +1,16 @@
 //! Walks the typed program and collects the equations between units.
 
-use super::dimension::{Dimension, LENGTH, VELOCITY};
+use super::dimension::{Dimension, FREQUENCY, LENGTH, VELOCITY};
 use super::solver::Solver;
 use super::{declared, rules};
 use crate::check::constant::evaluate;
 use crate::check::typed::{Input, Program, Source, Typed, TypedKind};
 use crate::diagnostic::{Diagnostic, Diagnostics, Span};
 use crate::functions::Shape;
+use crate::syntax::ElementType;
 
-/// The dimensions of a value: one; two for a dual quaternion (its parts) and for a twist (θ and t).
+/// The dimensions of a value: one; two for a dual quaternion (its parts), for a twist (θ and t) and for a motion (rotation
+/// and position).
 #[derive(Clone, Debug)]
 pub(super) struct Units(pub(super) Vec<Dimension>);
 
@@ -39,7 +41,7 @@ impl Units {
 
 /// Returns how many dimensions a value of a shape has.
 fn parts(shape: Shape) -> usize {
-    if matches!(shape, Shape::DualQuat | Shape::Twist) { 2 } else { 1 }
+    if matches!(shape, Shape::DualQuat | Shape::Twist | Shape::Motion) { 2 } else { 1 }
 }
 
 /// State of the walk.
@@ -128,7 +130,7 @@ impl<'a> Inference<'a> {
     fn input(&mut self, source: Source, first: usize, shape: Shape) -> Units {
         let (section, list): (u8, &[Input]) = match source {
             Source::Position => (0, &self.program.moving),
-            Source::Velocity => return Units::one(Dimension::of(VELOCITY)),
+            Source::Velocity => return Units::one(self.rate(first)),
             Source::Rest => (1, &self.program.rest),
             Source::Parameter => (2, &self.program.parameters),
         };
@@ -140,13 +142,38 @@ impl<'a> Inference<'a> {
         }
         let units = match (shape, declared(input)) {
             // A rotation is a plain number; a translation is not.
-            (Shape::Twist, known) => Units::two(Dimension::default(), known.unwrap_or(Dimension::of(LENGTH))),
+            (Shape::Twist | Shape::Motion, known) => {
+                Units::two(Dimension::default(), known.unwrap_or(Dimension::of(LENGTH)))
+            }
             (Shape::DualQuat, Some(known)) => Units::two(Dimension::default(), known),
             (_, Some(known)) => Units::one(known),
             (_, None) => self.fresh(shape),
         };
         self.inputs.push((key, units.clone()));
         units
+    }
+
+    /// Returns the dimension of the velocity whose first component is this increment.
+    fn rate(&self, first: usize) -> Dimension {
+        let mut next = 0;
+        let owner = self.program.moving.iter().find(|input| {
+            next += input.input_type.element.increments();
+            first < next
+        });
+        match owner.map(|input| input.input_type.element) {
+            Some(ElementType::Rotation) => Dimension::of(FREQUENCY),
+            _ => Dimension::of(VELOCITY),
+        }
+    }
+
+    /// Returns the dimension of an unknown. A rotation moves by numbers.
+    pub(super) fn unknown(&mut self, unknown: &Input) -> Dimension {
+        self.input(Source::Position, unknown.first, Shape::Scalar).main()
+    }
+
+    /// Returns the dimension of a parameter.
+    pub(super) fn parameter(&mut self, parameter: &Input) -> Dimension {
+        self.input(Source::Parameter, parameter.first, Shape::Scalar).main()
     }
 
     /// Requires equal dimensions of all values, and returns them.

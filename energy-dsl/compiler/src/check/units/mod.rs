@@ -9,7 +9,7 @@ mod solver;
 use super::typed::{Binding, Input, Program, Typed, TypedKind};
 use crate::diagnostic::{Diagnostic, Diagnostics, Span};
 use crate::syntax::ElementType;
-use dimension::{Dimension, ENERGY, FORCE, LENGTH, VELOCITY};
+use dimension::{Dimension, ENERGY, LENGTH, VELOCITY};
 use energy_runtime::Kind;
 use infer::Inference;
 
@@ -36,25 +36,42 @@ pub(super) fn check(program: &Program, diagnostics: &mut Diagnostics) {
         TypedKind::Call(f, rows) if f.name == "vector" && program.kind != Kind::Energy => rows,
         _ => std::slice::from_ref(&program.result),
     };
-    for result in results {
+    for (number, result) in results.iter().enumerate() {
         let found = inference.expression(result).main();
-        let (what, wanted) = match program.kind {
-            Kind::Energy => ("an energy must come out in J", ENERGY),
-            Kind::Force => ("a force must come out in N", FORCE),
-            Kind::Constraint | Kind::Residual => continue,
-        };
-        inference.result(&found, &Dimension::of(wanted), &result.span, what);
+        match program.kind {
+            Kind::Energy => {
+                inference.result(&found, &Dimension::of(ENERGY), &result.span, "an energy must come out in J");
+            }
+            Kind::Force => {
+                let unknown = &program.moving[number];
+                let wanted = Dimension::of(ENERGY).over(&inference.unknown(unknown));
+                let what = match unknown.input_type.element {
+                    ElementType::Rotation => "a torque must come out in N m",
+                    _ => "a force must come out in N",
+                };
+                inference.result(&found, &wanted, &result.span, what);
+            }
+            Kind::Constraint | Kind::Residual => {}
+        }
+    }
+    let next = program.next.as_ref().map_or_else(Vec::new, Typed::parts);
+    let states = program.state().iter().flat_map(|state| vec![state; state.input_type.length.unwrap_or(1)]);
+    for (value, state) in next.into_iter().zip(states) {
+        let found = inference.expression(value).main();
+        let wanted = inference.parameter(state);
+        let what = format!("the new value of `{}` must have the unit of the state", state.name);
+        inference.result(&found, &wanted, &value.span, &what);
     }
 }
 
-/// Returns the exponents of kg, m and s of a unit such as `N/m`; `None` if the text is not a unit.
+/// Returns the exponents of kg, m, s and K of a unit such as `N/m`; `None` if the text is not a unit.
 ///
 /// ```
-/// assert_eq!(energy_compiler::unit_exponents("N/m"), Some([1.0, 0.0, -2.0]));
+/// assert_eq!(energy_compiler::unit_exponents("N/m"), Some([1.0, 0.0, -2.0, 0.0]));
 /// assert_eq!(energy_compiler::unit_exponents("stone"), None);
 /// ```
 #[must_use]
-pub fn unit_exponents(unit: &str) -> Option<[f64; 3]> {
+pub fn unit_exponents(unit: &str) -> Option<[f64; 4]> {
     dimension::parse(unit).ok().map(|dimension| dimension.base)
 }
 
@@ -83,7 +100,8 @@ fn declared(input: &Input) -> Option<Dimension> {
         return dimension::parse(&input.unit).ok();
     }
     match input.input_type.element {
-        ElementType::Point | ElementType::Twist => Some(Dimension::of(LENGTH)),
+        ElementType::Point | ElementType::Point2 | ElementType::Twist => Some(Dimension::of(LENGTH)),
+        ElementType::Rotation => Some(Dimension::default()),
         ElementType::Velocity => Some(Dimension::of(VELOCITY)),
         _ => None,
     }

@@ -44,6 +44,7 @@ pub(super) fn apply(inference: &mut Inference<'_>, call: &Call<'_>, rule: Rule) 
         }
         Rule::SquareOfSame => inference.same(call.name, &all, call.span).map(|d| d.power(2.0)),
         Rule::First => call.units[0].clone(),
+        Rule::Power(_) if call.is(0, Shape::Motion) => call.units[0].clone(),
         Rule::Power(exponent) => call.units[0].map(|d| d.power(exponent)),
         Rule::PowerOfSize(more) => {
             let size = if let Shape::Matrix(n, _) = call.arguments[0].shape { f64::from(n) } else { 1.0 };
