@@ -1,6 +1,7 @@
 //! Time of Newton's method for rods of 1,000 and 10,000 nodes: points and twists by turns, 10 off-diagonals.
 //!
 //! `cargo bench -p energy-solve --bench rods`
+#![allow(confusable_idents, mixed_script_confusables)]
 
 use std::time::{Duration, Instant};
 

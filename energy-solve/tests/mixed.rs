@@ -77,6 +77,20 @@ fn everything() -> (MixedSystem, Vec<f64>) {
     (system, u)
 }
 
+/// Increments that move, and how far.
+type Moves = [(usize, f64)];
+
+/// Returns a difference of values by one increment.
+fn slope(at: &mut impl FnMut(&Moves) -> f64, i: usize, h: f64) -> f64 {
+    (at(&[(i, h)]) - at(&[(i, -h)])) / (2.0 * h)
+}
+
+/// Returns a second difference of values by two increments.
+fn second(at: &mut impl FnMut(&Moves) -> f64, i: usize, j: usize, h: f64) -> f64 {
+    let mut corner = |by_i: f64, by_j: f64| at(&[(i, by_i), (j, by_j)]);
+    (corner(h, h) - corner(h, -h) - corner(-h, h) + corner(-h, -h)) / (4.0 * h * h)
+}
+
 #[test]
 fn derivatives_are_those_of_the_energy() {
     let (mut system, u) = everything();
@@ -86,7 +100,7 @@ fn derivatives_are_those_of_the_energy() {
     let (_, again) = system.linearise(&u, Curvature::Exact, &mut matrix).unwrap();
     let apart = gradient.iter().zip(&again).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
     assert!(apart < 1e-13, "gradients of both routines differ by {apart:e}");
-    let mut at = |moves: &[(usize, f64)]| {
+    let mut at = |moves: &Moves| {
         let mut delta = vec![0.0; increments];
         moves.iter().for_each(|&(i, by)| delta[i] += by);
         let moved = system.body().moved(&u, 1.0, &delta);
@@ -94,16 +108,10 @@ fn derivatives_are_those_of_the_energy() {
     };
     for i in 0..increments {
         let (near, far) = (1e-3, 2e-3);
-        let slope =
-            |at: &mut dyn FnMut(&[(usize, f64)]) -> f64, by: f64| (at(&[(i, by)]) - at(&[(i, -by)])) / (2.0 * by);
-        let difference = (4.0 * slope(&mut at, near) - slope(&mut at, far)) / 3.0;
+        let difference = (4.0 * slope(&mut at, i, near) - slope(&mut at, i, far)) / 3.0;
         assert!((difference - gradient[i]).abs() < 1e-8, "increment {i}: {difference} against {}", gradient[i]);
     }
-    // Hessians by second differences of values: differences of gradients along exp are not symmetric.
-    let second = |at: &mut dyn FnMut(&[(usize, f64)]) -> f64, i: usize, j: usize, h: f64| {
-        (at(&[(i, h), (j, h)]) - at(&[(i, h), (j, -h)]) - at(&[(i, -h), (j, h)]) + at(&[(i, -h), (j, -h)]))
-            / (4.0 * h * h)
-    };
+    // Differences of gradients along exp are not symmetric: Hessians are second differences of values.
     let mut differences = DMatrix::zeros(increments, increments);
     for i in 0..increments {
         for j in 0..increments {

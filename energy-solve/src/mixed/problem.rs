@@ -59,7 +59,7 @@ impl Problem<'_> {
             let (energy, gradient) = self.system.linearise_shared(u, matrix)?;
             let slack = 1e-14 * energy.magnitude;
             if let Some((before, from, increments)) = &best
-                && !(energy.value >= before - slack)
+                && (energy.value.is_nan() || energy.value < before - slack)
             {
                 step *= 0.5;
                 *u = self.system.body().moved(from, step, increments);

@@ -81,6 +81,7 @@ impl<T: Real, const D: usize> Sub for Jet<T, D> {
 impl<T: Real, const D: usize> Mul for Jet<T, D> {
     type Output = Self;
 
+    #[expect(clippy::suspicious_arithmetic_impl, reason = "the product rule")]
     fn mul(self, other: Self) -> Self {
         let (a, b) = (&self, &other);
         let entry = |i: usize, j: usize| {
