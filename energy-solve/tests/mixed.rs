@@ -433,6 +433,21 @@ fn an_equilibrium_that_is_not_stable_is_called_a_saddle() {
     assert_eq!(found, u);
 }
 
+#[test]
+fn a_singular_projected_hessian_is_damped() {
+    // A single compressed spring: clamped, its Hessian has rank 1.
+    let body = MixedBody::new(&[VECTOR; 2], 1.0).with_fixed(&[0]).unwrap();
+    let spring = MixedTerm::of_points("spring", vec![Spring { stiffness: 100.0, length: 1.0 }], &[[0, 1]]);
+    let weight = MixedTerm::of_points("weight", vec![energy_elements::Gravity::new(2.0, [0.0, 0.0, -9.81])], &[[1]]);
+    let mut system = MixedSystem::new(body, vec![spring.unwrap(), weight.unwrap()]).unwrap();
+    for solver in [BAND, gradients()] {
+        let mut newton = MixedNewton::new(&system, &solver, MixedNewtonOptions::new(1e-12));
+        let (u, report) = newton.minimise(&mut system, &[0.0, 0.0, 0.0, 0.3, 0.0, -0.9]).unwrap();
+        assert!(report.converged() && report.projected > 0, "{report:?}");
+        assert!((u[5] + 1.0 + 2.0 * 9.81 / 100.0).abs() < 1e-12);
+    }
+}
+
 /// A rigid body of 1 kg whose hinge at (0, 0, l) in its frame is tied to the origin by a stiff spring. It hangs below.
 fn pendulum(lever: f64, scheme: MixedScheme, tensor: [f64; 3]) -> MixedIntegrator {
     let body = MixedBody::new(&[UnknownKind::Rotation, VECTOR], lever);
