@@ -275,3 +275,42 @@ fn times(matrix: &Block<f64>, v: Vector3<f64>) -> Vector3<f64> {
 fn dot(a: Vector3<f64>, b: Vector3<f64>) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mixed::MixedSystem;
+
+    #[test]
+    fn derivatives_are_those_of_the_energy() {
+        let body = MixedBody::new(&[UnknownKind::Rotation, UnknownKind::Vector2], 1.0);
+        let inertia = [Inertia::Tensor([[1.0, 0.2, 0.0], [0.2, 2.0, 0.1], [0.0, 0.1, 3.0]]), Inertia::Mass(0.7)];
+        let (start, rates) = ([0.6, 0.0, 0.8, 0.0, 1.0, -1.0], [0.3, 1.0, -0.5, 0.2, 0.4]);
+        let potential = InertialPotential::new(&body, &inertia, (&start, &rates), 0.5, 0.5);
+        let u = body.moved(&start, 1.0, &[0.5, -0.2, 0.7, 0.3, 0.1]);
+        let system = MixedSystem::new(body.clone(), Vec::new()).unwrap();
+        let mut matrix = system.matrix();
+        potential.add_hessian(&body, &u, Curvature::Exact, system.rows(), &mut matrix);
+        let mut gradient = [0.0; 5];
+        potential.add_gradient(&body, &u, &mut gradient);
+        let at = |i: usize, by_i: f64, j: usize, by_j: f64| {
+            let mut delta = [0.0; 5];
+            delta[i] += by_i;
+            delta[j] += by_j;
+            potential.energy(&body, &body.moved(&u, 1.0, &delta)).value
+        };
+        let h = 1e-3;
+        for i in 0..5 {
+            let slope = (at(i, h, i, 0.0) - at(i, -h, i, 0.0)) / (2.0 * h);
+            assert!((slope - gradient[i]).abs() < 1e-5, "{i}: {slope} against {}", gradient[i]);
+            let (mut unit, mut column) = ([0.0; 5], [0.0; 5]);
+            unit[i] = 1.0;
+            matrix.multiply(&system.free_part(&unit), &mut column);
+            let column = system.spread(&column);
+            for j in 0..5 {
+                let second = (at(i, h, j, h) - at(i, h, j, -h) - at(i, -h, j, h) + at(i, -h, j, -h)) / (4.0 * h * h);
+                assert!((second - column[j]).abs() < 1e-4, "({i}, {j}): {second} against {}", column[j]);
+            }
+        }
+    }
+}
