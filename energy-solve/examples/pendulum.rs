@@ -9,8 +9,8 @@ use energy_solve::{
 };
 
 energy! {
-    /// A stiff spring between the origin and a point of a rigid body. `arm` is the way to it from the centre of mass x, in
-    /// the frame of the body; q is the body's orientation.
+    /// A stiff spring between the origin and a point of a rigid body. `arm` is the way to it from the centre of mass x,
+    /// in the frame of the body; q is the body's orientation.
     pub energy Hinge(q: Rotation, x: Point; k: Scalar[N/m], arm: Vec3[m]) {
         k / 2 * norm_squared(x + rotate(q, arm))
     }

@@ -54,8 +54,8 @@ pub enum BorderedError {
 /// those of A must together be as many as there are maximised unknowns (Haynsworth 1968). A alone may be indefinite:
 /// then the solution is refined once.
 ///
-/// Conjugate gradients iterate on what is left once the maximised unknowns are eliminated, A − B C⁻¹ Bᵀ, bordered by the
-/// minimised unknowns.
+/// Conjugate gradients iterate on what is left once the maximised unknowns are eliminated, A − B C⁻¹ Bᵀ, bordered by
+/// the minimised unknowns.
 #[derive(Debug)]
 pub struct BorderedSolver {
     inner: Inner,

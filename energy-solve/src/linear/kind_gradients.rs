@@ -111,8 +111,8 @@ impl<'a> Reduced<'a> {
         self.subtract_coupled(&values, y);
     }
 
-    /// Returns the inverse diagonal blocks: one per unknown, then one per minimised increment. They are positive definite
-    /// if the matrix is.
+    /// Returns the inverse diagonal blocks: one per unknown, then one per minimised increment. They are positive
+    /// definite if the matrix is.
     fn inverse_diagonal(&self) -> Result<Vec<Inverse>, BorderedError> {
         let pattern = self.matrix.kinds.pattern();
         let own = (0..pattern.unknowns()).map(|unknown| {

@@ -62,8 +62,8 @@ pub enum Extremum {
 
 /// The unknowns of a body: those that elements have of their own, in order, and those that all elements share.
 ///
-/// A *configuration* u is a flat vector with the numbers of the unknowns, then of the shared ones. Gradients, forces and
-/// rates have one number per increment, in the same order.
+/// A *configuration* u is a flat vector with the numbers of the unknowns, then of the shared ones. Gradients, forces
+/// and rates have one number per increment, in the same order.
 ///
 /// Increments of different units are compared by a *scale*, in m per unit: 1 for vectors, and the length that
 /// [`MixedBody::new`] takes for scalars and rotations, whose unit is then the radian.
@@ -111,7 +111,8 @@ impl MixedBody {
     ///
     /// // Two points of a rod with a twist angle between them, and a pressure. The first point is fixed.
     /// let kinds = [UnknownKind::Vector3, UnknownKind::Scalar, UnknownKind::Vector3];
-    /// let body = MixedBody::new(&kinds, 0.01).with_shared(UnknownKind::Scalar, Extremum::Maximum, 0.0).with_fixed(&[0])?;
+    /// let body = MixedBody::new(&kinds, 0.01);
+    /// let body = body.with_shared(UnknownKind::Scalar, Extremum::Maximum, 0.0).with_fixed(&[0])?;
     /// assert_eq!((body.numbers(), body.increments()), (8, 8));
     /// assert_eq!(body.first_number(2), 4);
     /// # Ok::<(), energy_solve::MixedError>(())
@@ -292,8 +293,8 @@ impl MixedBody {
         }
     }
 
-    /// Returns the configuration that u becomes by `scale` times these increments: u + δ, and exp(δ) q, renormalised, for
-    /// rotations. Unknowns whose increments are zero keep their bits.
+    /// Returns the configuration that u becomes by `scale` times these increments: u + δ, and exp(δ) q, renormalised,
+    /// for rotations. Unknowns whose increments are zero keep their bits.
     ///
     /// # Panics
     /// If a vector does not have the length that the body needs.

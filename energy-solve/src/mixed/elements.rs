@@ -166,8 +166,8 @@ impl<E: Stateful<f64>> StateRoutines<E> {
 
 /// Elements that are not packed yet.
 pub(super) trait Unplaced: Debug + Send + Sync {
-    /// Packs the elements with the indices `active`. Element i has the stencil `stencils[i]`, of the unknowns' numbers or
-    /// of points; `numbers[i]` are its unknowns' numbers. Both follow each other, `per_element` for each.
+    /// Packs the elements with the indices `active`. Element i has the stencil `stencils[i]`, of the unknowns' numbers
+    /// or of points; `numbers[i]` are its unknowns' numbers. Both follow each other, `per_element` for each.
     fn place(self: Box<Self>, active: &[u32], stencils: &[u32], numbers: Vec<u32>) -> Box<dyn Elements>;
 }
 

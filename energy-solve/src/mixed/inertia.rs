@@ -56,8 +56,8 @@ fn is_inertia(tensor: &Block<f64>) -> bool {
 
 /// Σ ½ m ‖x − x̃‖²/τ² over flat unknowns and Σ (2/τ²) vᵀ J v over rotations, where v is the vector part of q q̃⁻¹.
 ///
-/// x̃ and q̃ are where free motion leads within the time τ. For a small difference φ of rotations, v = φ/2: the potential
-/// is ½ φᵀ J φ/τ², like that of points. Its gradient times τ is the change of momentum within the step.
+/// x̃ and q̃ are where free motion leads within the time τ. For a small difference φ of rotations, v = φ/2: the
+/// potential is ½ φᵀ J φ/τ², like that of points. Its gradient times τ is the change of momentum within the step.
 #[derive(Debug)]
 pub(super) struct InertialPotential {
     time: f64,
@@ -83,8 +83,8 @@ struct Turning {
 }
 
 impl InertialPotential {
-    /// Creates the potential of a step of length `time` from u with these rates. `reference` is the time, as a fraction of
-    /// the step, at which the inertia tensor gives the angular velocity: ½ is the midpoint rule.
+    /// Creates the potential of a step of length `time` from u with these rates. `reference` is the time, as a fraction
+    /// of the step, at which the inertia tensor gives the angular velocity: ½ is the midpoint rule.
     pub(super) fn new(
         body: &MixedBody,
         inertia: &[Inertia],
@@ -245,8 +245,8 @@ fn derivative(w: f64, [x, y, z]: Vector3<f64>) -> Block<f64> {
     [[w, z, -y], [-z, w, x], [y, -x, w]].map(|row| row.map(|entry| 0.5 * entry))
 }
 
-/// Returns where a rotation without torque is after some time: exp(t ω) q, where the angular momentum is R J Rᵀ ω at the
-/// reference. Solved by fixed-point iteration, which contracts while the turn is well below a radian.
+/// Returns where a rotation without torque is after some time: exp(t ω) q, where the angular momentum is R J Rᵀ ω at
+/// the reference. Solved by fixed-point iteration, which contracts while the turn is well below a radian.
 fn free_rotation(tensor: &Block<f64>, q: Quaternion, rate: Vector3<f64>, time: f64, reference: f64) -> Quaternion {
     let momentum = times(&rotation::turned(tensor, q), rate);
     let mut mean = rate;

@@ -17,8 +17,8 @@ pub struct MixedNewtonOptions {
     pub tolerance: f64,
     /// Stop after this many iterations.
     pub iteration_limit: usize,
-    /// Shorten steps that move an unknown further than this, in m by its scale. Rotations turn by one radian per step at
-    /// most.
+    /// Shorten steps that move an unknown further than this, in m by its scale. Rotations turn by one radian per step
+    /// at most.
     pub stride: f64,
 }
 
@@ -48,8 +48,8 @@ impl MixedNewtonOptions {
 pub enum MixedStop {
     /// A full Newton step with a positive definite exact Hessian met the tolerance.
     Converged,
-    /// The gradient vanishes, but the Hessian is not positive definite: an equilibrium that is not stable, or that can move
-    /// without a change of energy.
+    /// The gradient vanishes, but the Hessian is not positive definite: an equilibrium that is not stable, or that can
+    /// move without a change of energy.
     Saddle,
     /// No step lowers the energy by more than rounding.
     Stalled,
@@ -120,12 +120,12 @@ const ROUNDING: f64 = 1e-14;
 
 /// Newton's method with a line search on the energy.
 ///
-/// Each step solves K d = −∂U/∂u with the exact Hessian K. If K is not positive definite, element Hessians are projected
-/// ([`Curvature::Clamped`]) and damped: 10⁻⁹ of the largest stiffness is added to the diagonal, and a hundred times more
-/// after each step that was far too long, as projected Hessians may be singular.
+/// Each step solves K d = −∂U/∂u with the exact Hessian K. If K is not positive definite, element Hessians are
+/// projected ([`Curvature::Clamped`]) and damped: 10⁻⁹ of the largest stiffness is added to the diagonal, and a hundred
+/// times more after each step that was far too long, as projected Hessians may be singular.
 ///
-/// Shared unknowns that are [maximised](super::Extremum::Maximum) are eliminated: steps minimise the potential maximised
-/// over them.
+/// Shared unknowns that are [maximised](super::Extremum::Maximum) are eliminated: steps minimise the potential
+/// maximised over them.
 ///
 /// ```
 /// use energy_elements::{Gravity, HookeSpring};
@@ -175,8 +175,8 @@ impl MixedNewton {
     /// is an equilibrium if the report has converged. States of elements do not change.
     ///
     /// # Errors
-    /// If u is not a configuration of the body, its energy is not finite, a derivative is not finite, a linear system has
-    /// no solution, or the potential is not concave in a maximised unknown.
+    /// If u is not a configuration of the body, its energy is not finite, a derivative is not finite, a linear system
+    /// has no solution, or the potential is not concave in a maximised unknown.
     ///
     /// # Panics
     /// If this was created for another system.

@@ -268,8 +268,8 @@ impl MixedSystem {
         Ok((sum.energy(), gradient))
     }
 
-    /// Replaces the state of each element by the one after a step that ends at u. Call it once after each accepted step.
-    /// All new states are computed before any is replaced.
+    /// Replaces the state of each element by the one after a step that ends at u. Call it once after each accepted
+    /// step. All new states are computed before any is replaced.
     ///
     /// # Errors
     /// If u is not a configuration of the body, or a new state is not finite. Then nothing has changed.

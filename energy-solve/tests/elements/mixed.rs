@@ -19,8 +19,8 @@ const ROD: &[Field] = &[
 ];
 
 mixed_element!(
-    /// A rod's node with two edges d and e: stretch k/2 (‖d‖ − L)², bending B/2 ‖e − d‖², twist C/2 (θ₁ − θ₀ − τ)² + C/4
-    /// (θ₀² + θ₁²), and a coupling of both, C/4 (θ₀ + θ₁) (e − d)₃.
+    /// A rod's node with two edges d and e: stretch k/2 (‖d‖ − L)², bending B/2 ‖e − d‖², twist C/2 (θ₁ − θ₀ − τ)² +
+    /// C/4 (θ₀² + θ₁²), and a coupling of both, C/4 (θ₀ + θ₁) (e − d)₃.
     Rod[11, 11, 66](stretch, length, bend, twist, rest)
     declared("Rod", ROD, &[]), |p, u| {
         let point = |first: usize| [u[first], u[first + 1], u[first + 2]];

@@ -71,8 +71,8 @@ pub struct Packed<E, S = f64> {
 }
 
 impl<S: Real, E: Stored<S>> Packed<E, S> {
-    /// Packs elements; element i acts on the points `stencils[i]`. The stencil of a residual, or of a potential of mixed
-    /// unknowns, has one index per number of its unknowns.
+    /// Packs elements; element i acts on the points `stencils[i]`. The stencil of a residual, or of a potential of
+    /// mixed unknowns, has one index per number of its unknowns.
     ///
     /// # Panics
     /// When there are not as many stencils as elements.
