@@ -23,8 +23,8 @@ energy! {
     /// against reference frames; m is the twist between these, C the twisting stiffness, and τ the natural twist per
     /// length (Bergou, Audoly, Vouga, Wardetzky and Grinspun 2010).
     ///
-    /// Reference frames are transported in time: between two steps, m grows by the area that the tangents enclose on the
-    /// unit sphere. The state keeps the tangents of the last step, t0 and t1, and its m. It starts with the tangents and
+    /// Reference frames are transported in time: between two steps, m grows by the area on the unit sphere that the path
+    /// of the tangents encloses, from the last ones to the present ones. The state keeps the tangents of the last step, t0 and t1, and its m. It starts with the tangents and
     /// with m = 0. A tangent must not turn by half a turn within a step.
     #[audit]
     pub energy RodTwist(
@@ -34,7 +34,7 @@ energy! {
     ) {
         let a = unit(x1 - x0);
         let b = unit(x2 - x1);
-        let turned = m + solid_angle(t0, a, b) + solid_angle(t0, b, t1);
+        let turned = m + solid_angle(t0, b, a) + solid_angle(t0, t1, b);
         next { t0 = a; t1 = b; m = turned; }
         C / (2 * l) * (θ1 - θ0 + turned - l * τ)^2
     }

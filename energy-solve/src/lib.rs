@@ -28,6 +28,17 @@
 //!
 //! Contact is not a sum of fixed elements: see [`ContactModel`] and [`OverRelaxation::scale_with_contacts`].
 //!
+//! # Unknowns that are not only points
+//!
+//! A [`MixedBody`] has scalars (twist angles), vectors of 2 and 3, rotations, and unknowns that all elements share (a
+//! pressure). A [`MixedSystem`] sums [`MixedTerm`]s over it: potentials of mixed unknowns, with or without a state, and
+//! those of points. It returns U, ∂U/∂u by increments, and ∂²U/∂u² as a [`BorderedMatrix`]: a [`KindMatrix`], whose
+//! blocks have the sizes of their unknowns, and dense rows for shared ones. [`MixedNewton`] finds equilibria, and
+//! [`MixedIntegrator`] takes time steps with masses and inertia tensors. [`BorderedSolver`] solves the linear systems,
+//! by a [`BandFactor`] for chains such as rods, otherwise by conjugate gradients.
+//!
+//! # Least squares
+//!
 //! A [`GaussNewton`] solver minimises sums of squared residuals ([`ResidualTerm`]) over blocks of unknowns.
 //!
 //! ```
@@ -52,6 +63,7 @@ mod contact;
 mod least_squares;
 mod linear;
 mod matrix;
+mod mixed;
 mod system;
 mod terms;
 pub mod threads;
@@ -66,10 +78,18 @@ pub use least_squares::{
     TermSum,
 };
 pub use linear::{
-    BlockCholesky, CholeskyError, Multigrid, OverRelaxation, SingularBlock, SolveOptions, SolveReport, StopReason,
-    bicgstab,
+    BandFactor, BandOrder, BlockCholesky, BorderedError, BorderedSolver, CholeskyError, KindSolver, Multigrid,
+    OverRelaxation, SingularBlock, SingularPivot, SolveOptions, SolveReport, StopReason, bicgstab,
 };
-pub use matrix::{BlockMatrix, Blocks, Bsr, Csr, DofMap, Pattern, Precision, Storage, dot, index};
+pub use matrix::{
+    BlockMatrix, Blocks, BorderedMatrix, Bsr, Csr, DofMap, KindMatrix, KindPattern, Pattern, Precision, Storage, dot,
+    index,
+};
+pub use mixed::{
+    ElementStates, Extremum, Inertia, MixedBody, MixedEnergy, MixedError, MixedIntegrator, MixedNewton,
+    MixedNewtonError, MixedNewtonOptions, MixedNewtonReport, MixedScheme, MixedState, MixedStop, MixedSystem,
+    MixedTerm, UnknownKind,
+};
 pub use system::{EvaluationError, LinearisationOptions, LinearisedForces, System, SystemError, TermEnergy};
 pub use terms::{
     Character, Counts, Curvature, DissipationLaw, DissipationTerm, Divisible, DrivenLaw, DrivenTerm, ElementList,

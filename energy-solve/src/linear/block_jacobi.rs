@@ -40,3 +40,10 @@ pub(crate) fn inverse(block: &Block<f64>) -> Option<Block<f64>> {
     let inverse = adjugate.map(|row| row.map(|entry| entry / determinant / scale));
     inverse.iter().flatten().all(|entry| entry.is_finite()).then_some(inverse)
 }
+
+/// Whether the leading minors are positive (Sylvester's criterion).
+pub(crate) fn is_positive_definite([[a, b, c], [d, e, f], [g, h, i]]: &Block<f64>) -> bool {
+    let minor = a * e - b * d;
+    let determinant = a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g);
+    *a > 0.0 && minor > 0.0 && determinant > 0.0
+}

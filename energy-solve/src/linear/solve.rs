@@ -7,6 +7,15 @@ pub struct SingularBlock {
     pub row: usize,
 }
 
+/// A factorisation without row exchanges met a pivot that is zero or not finite.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("the pivot of unknown {unknown} is zero or not finite; a free unknown needs mass or stiffness")]
+#[non_exhaustive]
+pub struct SingularPivot {
+    /// Number of the unknown among the free ones.
+    pub unknown: usize,
+}
+
 /// Stopping criteria of a linear solver.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]

@@ -1,4 +1,7 @@
-//! Two elements written by hand, to test assembly and solvers independently of generated code.
+//! Elements written by hand, to test assembly and solvers independently of generated code.
+
+pub(crate) mod jets;
+pub(crate) mod mixed;
 
 use std::borrow::Cow::Borrowed;
 

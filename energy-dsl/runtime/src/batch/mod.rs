@@ -6,6 +6,7 @@
 
 mod error;
 mod forces;
+mod mixed;
 mod packed;
 mod potentials;
 mod residuals;

@@ -71,7 +71,8 @@ pub struct Packed<E, S = f64> {
 }
 
 impl<S: Real, E: Stored<S>> Packed<E, S> {
-    /// Packs elements; element i acts on the points `stencils[i]`. The stencil of a residual has one index per unknown.
+    /// Packs elements; element i acts on the points `stencils[i]`. The stencil of a residual, or of a potential of
+    /// mixed unknowns, has one index per number of its unknowns.
     ///
     /// # Panics
     /// When there are not as many stencils as elements.
@@ -234,4 +235,15 @@ impl<S: Real + Lane<S>, E: PackedPotential<S>> Packed<E, S> {
         assert!(element < self.elements, "element {element} of {}", self.elements);
         E::load::<S>(self.numbers_from(element / BLOCK, element % BLOCK), BLOCK)
     }
+}
+
+/// Gathers unknowns, one element per lane, from the stencils of a block's elements.
+#[inline(always)]
+pub(super) fn gather_numbers<S: Real, V: Lane<S>, U: Array<V>>(stencils: &[u32], unknowns: &[S]) -> U {
+    let mut wide = U::repeat(V::from_f64(0.0));
+    for (number, wide) in wide.as_mut().iter_mut().enumerate() {
+        let indices = &stencils[number * BLOCK..][..V::LANES];
+        *wide = V::from_fn(|lane| unknowns[indices[lane] as usize]);
+    }
+    wide
 }

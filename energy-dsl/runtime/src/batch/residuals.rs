@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use super::error::{BatchError, Flagged, check_output, note_flags};
-use super::packed::{BLOCK, Packed, PackedResidual};
+use super::packed::{BLOCK, Packed, PackedResidual, gather_numbers};
 use super::potentials::store_rows;
 use crate::array::Array;
 use crate::element::Residual;
@@ -40,17 +40,6 @@ impl<S: Float, E: PackedResidual<S>> Packed<E, S> {
     }
 }
 
-/// Gathers the unknowns of the elements in a block, one element per lane, from the one at `offset` on.
-#[inline(always)]
-fn gather<S: Float, V: Lane<S>, U: Array<V>>(stencils: &[u32], unknowns: &[S]) -> U {
-    let mut wide = U::repeat(V::from_f64(0.0));
-    for (number, wide) in wide.as_mut().iter_mut().enumerate() {
-        let indices = &stencils[number * BLOCK..][..V::LANES];
-        *wide = V::from_fn(|lane| unknowns[indices[lane] as usize]);
-    }
-    wide
-}
-
 struct Residuals<'a, E, S> {
     packed: &'a Packed<E, S>,
     range: Range<usize>,
@@ -68,7 +57,7 @@ impl<S: Float, E: PackedResidual<S>> Kernel for Residuals<'_, E, S> {
         for first in range.clone().step_by(lanes) {
             let (block, offset, count) = (first / BLOCK, first % BLOCK, lanes.min(range.end - first));
             let element = E::load::<S::Lanes<L>>(packed.numbers_from(block, offset), BLOCK);
-            let result = element.residual_at::<L>(&gather(packed.stencils_from(block, offset), unknowns));
+            let result = element.residual_at::<L>(&gather_numbers(packed.stencils_from(block, offset), unknowns));
             store_rows(result.value.as_ref(), first - range.start, count, residuals);
             if result.flags.any() {
                 note_flags(&mut flagged, first, count, result.flags.degenerate, result.flags.kink);
@@ -96,7 +85,7 @@ impl<S: Float, E: PackedResidual<S>> Kernel for ResidualsWithJacobians<'_, E, S>
         for first in range.clone().step_by(lanes) {
             let (block, offset, count) = (first / BLOCK, first % BLOCK, lanes.min(range.end - first));
             let element = E::load::<S::Lanes<L>>(packed.numbers_from(block, offset), BLOCK);
-            let result = element.jacobian_at::<L>(&gather(packed.stencils_from(block, offset), unknowns));
+            let result = element.jacobian_at::<L>(&gather_numbers(packed.stencils_from(block, offset), unknowns));
             let place = first - range.start;
             store_rows(result.value.as_ref(), place, count, residuals);
             store_rows(result.jacobian.as_ref(), place, count, jacobians);

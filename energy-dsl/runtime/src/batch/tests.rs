@@ -6,15 +6,17 @@ use std::ops::Range;
 use super::*;
 use crate::declaration::{Declaration, Kind};
 use crate::element::{
-    Block, Element, ForceLaw, Inputs, Outputs, Potential, ReducedPotential, Residual, RestError, Vector3,
+    Block, Element, ForceLaw, Inputs, MixedPotential, Outputs, Potential, ReducedPotential, Residual, RestError,
+    Vector3,
 };
-use crate::numbers::{Flags, Lane, Real};
+use crate::numbers::{Flags, Lane, Level, Real};
 use crate::results::{
-    ForceJacobians, ForceValue, Gradient, Hessian, ReducedHessian, ResidualJacobian, ResidualValue, Value,
+    ForceJacobians, ForceValue, Gradient, Hessian, MixedGradient, MixedHessian, MixedProduct, ReducedHessian,
+    ResidualJacobian, ResidualValue, Value,
 };
 
 /// U = k/2 ‖x₀ − x₁‖² + l, degenerate where the points coincide. As a force, −∂U/∂x − (v₀ − v₁) on the first point. As
-/// a residual, (k u₀ − u₁, u₀ u₁).
+/// a residual, (k u₀ − u₁, u₀ u₁). As a potential of two scalars, k u₀² u₁ + l, with a kink where they are equal.
 #[derive(Clone, Copy)]
 struct Spring<T>(T, T);
 
@@ -67,7 +69,7 @@ impl<T: Real> Potential<T> for Spring<T> {
     type Triangle = [Block<T>; 3];
 
     fn value(&self, x: &Self::Points) -> Value<T> {
-        let Gradient { value, flags, .. } = self.gradient(x);
+        let Gradient { value, flags, .. } = Potential::gradient(self, x);
         Value { value, flags }
     }
 
@@ -80,7 +82,7 @@ impl<T: Real> Potential<T> for Spring<T> {
     }
 
     fn hessian(&self, x: &Self::Points) -> Hessian<T, Self::Points, Self::Triangle> {
-        let Gradient { value, gradient, flags } = self.gradient(x);
+        let Gradient { value, gradient, flags } = Potential::gradient(self, x);
         Hessian { value, gradient, hessian: [self.0, -self.0, self.0].map(Self::diagonal), flags }
     }
 }
@@ -108,7 +110,7 @@ impl<T: Real> ForceLaw<T> for Spring<T> {
     }
 
     fn jacobians(&self, x: &Self::Points, v: &Self::Points) -> ForceJacobians<T, Self::Points, Self::Square> {
-        let (Gradient { gradient, flags, .. }, w) = (self.gradient(x), Self::difference(v));
+        let (Gradient { gradient, flags, .. }, w) = (Potential::gradient(self, x), Self::difference(v));
         let one = T::from_f64(1.0);
         let force =
             [[0, 1, 2].map(|axis| -gradient[0][axis] - w[axis]), [0, 1, 2].map(|axis| -gradient[1][axis] + w[axis])];
@@ -133,6 +135,48 @@ impl<T: Real> Residual<T> for Spring<T> {
     }
 }
 
+impl<T: Real> MixedPotential<T> for Spring<T> {
+    type Unknowns = [T; 2];
+    type Increments = [T; 2];
+    type Upper = [T; 3];
+
+    fn value(&self, u: &[T; 2]) -> Value<T> {
+        let MixedHessian { value, flags, .. } = MixedPotential::hessian(self, u);
+        Value { value, flags }
+    }
+
+    fn value_at<L: Level>(&self, u: &[T; 2]) -> Value<T> {
+        MixedPotential::value(self, u)
+    }
+
+    fn gradient(&self, u: &[T; 2]) -> MixedGradient<T, [T; 2]> {
+        let MixedHessian { value, gradient, flags, .. } = MixedPotential::hessian(self, u);
+        MixedGradient { value, gradient, flags }
+    }
+
+    fn gradient_at<L: Level>(&self, u: &[T; 2]) -> MixedGradient<T, [T; 2]> {
+        MixedPotential::gradient(self, u)
+    }
+
+    fn hessian(&self, &[a, b]: &[T; 2]) -> MixedHessian<T, [T; 2], [T; 3]> {
+        let (k, zero, flags) = (self.0, T::from_f64(0.0), Flags { kink: a.equal(b), ..Flags::clear() });
+        let (gradient, hessian) = ([(k + k) * a * b, k * a * a], [(k + k) * b, (k + k) * a, zero]);
+        MixedHessian { value: k * a * a * b + self.1, gradient, hessian, flags }
+    }
+
+    fn hessian_at<L: Level>(&self, u: &[T; 2]) -> MixedHessian<T, [T; 2], [T; 3]> {
+        MixedPotential::hessian(self, u)
+    }
+
+    fn hessian_vector(&self, _: &[T; 2], _: &[T; 2]) -> MixedProduct<T, [T; 2]> {
+        unreachable!("batches do not use it")
+    }
+
+    fn hessian_vector_at<L: Level>(&self, _: &[T; 2], _: &[T; 2]) -> MixedProduct<T, [T; 2]> {
+        unreachable!("batches do not use it")
+    }
+}
+
 impl Stored<f64> for Spring<f64> {
     const NUMBERS: usize = 2;
 
@@ -153,7 +197,7 @@ macro_rules! packed {
     };
 }
 
-packed!(PackedPotential PackedForce PackedResidual);
+packed!(PackedPotential PackedForce PackedResidual PackedMixed);
 
 /// Enough springs for three blocks, of which the last is not full. Spring 20 and the last one have one point twice.
 const COUNT: usize = 37;
@@ -201,7 +245,7 @@ fn potentials_are_those_of_single_elements() {
         assert_eq!(energies_alone, energies);
         for (place, index) in range.enumerate() {
             let points = stencils[index].map(|point| x[point as usize]);
-            let single = springs[index].hessian(&points);
+            let single = Potential::hessian(&springs[index], &points);
             assert_eq!(energies[place], single.value);
             assert_eq!(gradients[6 * place..][..6], *single.gradient.as_flattened());
             assert_eq!(triangles[27 * place..][..27], *single.hessian.as_flattened().as_flattened());
@@ -249,6 +293,33 @@ fn residuals_are_those_of_single_elements() {
             let single = springs[index].jacobian(&stencils[index].map(|unknown| unknowns[unknown as usize]));
             assert_eq!(residuals[2 * place..][..2], single.value);
             assert_eq!(jacobians[4 * place..][..4], single.jacobian);
+        }
+    }
+}
+
+#[test]
+fn mixed_potentials_are_those_of_single_elements() {
+    let (springs, stencils) = springs();
+    let unknowns = vectors(3).into_iter().map(|[x, y, z]| 1000.0 * x + 10.0 * y + z).collect::<Vec<f64>>();
+    let packed = Packed::new(&springs, &stencils);
+    for range in RANGES {
+        let n = range.len();
+        let (mut energies, mut gradients, mut triangles) = (vec![0.0; n], vec![0.0; 2 * n], vec![0.0; 3 * n]);
+        let all = range.clone();
+        let flagged = packed.mixed_hessians(all, &unknowns, &mut energies, &mut gradients, &mut triangles).unwrap();
+        assert_eq!(indices(&flagged), flagged_in(&range));
+        let (mut again, mut energies_alone) = (vec![0.0; 2 * n], vec![0.0; n]);
+        packed.mixed_gradients(range.clone(), &unknowns, &mut energies_alone, &mut again).unwrap();
+        assert_eq!((&energies_alone, &again), (&energies, &gradients));
+        energies_alone.fill(0.0);
+        packed.mixed_values(range.clone(), &unknowns, &mut energies_alone).unwrap();
+        assert_eq!(energies_alone, energies);
+        for (place, index) in range.enumerate() {
+            let own = stencils[index].map(|unknown| unknowns[unknown as usize]);
+            let single = MixedPotential::hessian(&springs[index], &own);
+            assert_eq!(energies[place], single.value);
+            assert_eq!(gradients[2 * place..][..2], single.gradient);
+            assert_eq!(triangles[3 * place..][..3], single.hessian);
         }
     }
 }
@@ -307,6 +378,9 @@ fn arguments_that_do_not_fit_are_refused() {
     assert_eq!(of(packed.force_jacobians(0..0, &x, &x, &mut b, &mut c, &mut a)), wrong("Jacobians by velocity"));
     assert_eq!(of(packed.residuals(0..0, &numbers.clone(), &mut a)), wrong("residuals"));
     assert_eq!(of(packed.jacobians(0..0, &numbers.clone(), &mut b, &mut a)), wrong("Jacobians"));
+    assert_eq!(of(packed.mixed_values(0..0, &numbers.clone(), &mut a)), wrong("energies"));
+    assert_eq!(of(packed.mixed_gradients(0..0, &numbers.clone(), &mut b, &mut a)), wrong("gradients"));
+    assert_eq!(of(packed.mixed_hessians(0..0, &numbers.clone(), &mut b, &mut c, &mut a)), wrong("Hessians"));
     for range in [1..COUNT, 0..COUNT + 1, Range { start: 16, end: 0 }] {
         let expected = BatchError::Range { range: range.clone(), elements: COUNT, block: BLOCK };
         assert_eq!(packed.values(range, &x, &mut numbers).map(|_| ()), Err(expected));

@@ -1,7 +1,7 @@
 use energy_dsl::{Baseline, Block, triangle_index};
 
 use super::square::{AnySquare, Square};
-use super::{Curvature, fill_scaled, jacobi};
+use super::{Curvature, add_to, fill_scaled, jacobi};
 
 /// Projects the symmetric matrix with the given triangle of blocks: for elements whose coordinates are not independent
 /// differences of points. Returns whether an eigenvalue was changed. A matrix with a non-finite entry is left
@@ -26,4 +26,19 @@ pub fn change_dense(triangle: &mut [Block<f64>], points: usize, curvature: Curva
         }
     }
     true
+}
+
+/// Projects the symmetric n×n matrix with this upper triangle, row by row. Returns whether an eigenvalue was changed. A
+/// matrix with a non-finite entry is left unchanged.
+pub(crate) fn change_upper(upper: &mut [f64], n: usize, curvature: Curvature) -> bool {
+    if !upper.iter().all(|entry| entry.is_finite()) {
+        return false;
+    }
+    let mut a = AnySquare::zeros_of(n);
+    let scale = fill_scaled(&mut a, upper);
+    let (difference, changed) = jacobi::difference::<Baseline, f64, _>(&mut a, curvature);
+    if changed {
+        add_to(upper, &difference, scale, true);
+    }
+    changed
 }

@@ -17,6 +17,7 @@ use energy_dsl::{Kernel, Lane, Level, LevelName, Mask, Number, dispatch_at};
 
 pub(crate) use definite::is_semi_definite;
 pub use dense::change_dense;
+pub(crate) use dense::change_upper;
 pub(crate) use hinge::Hinges;
 pub(crate) use orthonormal::Orthonormal;
 use square::{AnySquare, Square};
