@@ -44,7 +44,8 @@ energy! {
     /// (Bergou, Wardetzky, Robinson, Audoly and Grinspun 2008).
     ///
     /// The frame of an edge is its director d, transported from the tangent t of the last step to the present one, and
-    /// turned by θ. Both elements of an edge transport its director by the same operations, so they keep the same bits.
+    /// turned by θ. For equal stiffnesses without natural curvature, [`RodBend`] is the same but for terms in the square of
+    /// the twist between the edges, and cheaper. Both elements of an edge transport its director by the same operations, so they keep the same bits.
     #[audit]
     pub energy RodBendAnisotropic(
         x0, x1, x2: Point, θ0, θ1: Scalar[rad];

@@ -7,7 +7,7 @@ use super::{positive, print};
 
 #[derive(Debug, Args)]
 pub struct Validate {
-    /// `cantilever`, `buckling`, `catenary`, `hanging-strip`, `modes`, `orders`, `momentum`, `contact`,
+    /// `cantilever`, `buckling`, `catenary`, `hanging-strip`, `modes`, `rods`, `orders`, `momentum`, `contact`,
     /// `long-run`; default: all.
     #[arg(value_parser = PossibleValuesParser::new(validate::QUESTIONS))]
     questions: Vec<String>,

@@ -24,13 +24,16 @@ mod long_run;
 mod modes;
 mod momentum;
 mod orders;
+mod rods;
 mod special;
 mod stack;
 mod stick_slip;
 mod strip;
 mod thinner;
 
-use energy_solve::{CholeskyError, EvaluationError, ListError, SystemError};
+use energy_solve::{
+    CholeskyError, EvaluationError, ListError, MixedError, MixedNewtonError, MixedNewtonReport, SystemError,
+};
 
 pub use cantilever::Cantilever;
 pub use elastica::Elastica;
@@ -105,6 +108,15 @@ pub enum ValidateError {
     /// A step failed.
     #[error(transparent)]
     Step(#[from] StepError),
+    /// A body of mixed unknowns is set up wrongly, or cannot be evaluated.
+    #[error(transparent)]
+    Mixed(#[from] MixedError),
+    /// A search for an equilibrium of mixed unknowns failed.
+    #[error(transparent)]
+    MixedNewton(#[from] MixedNewtonError),
+    /// A rod has no equilibrium that was found.
+    #[error("no equilibrium of the rod after {} iterations: {:?}", .0.iterations, .0.stopped)]
+    NoRest(MixedNewtonReport),
     /// A scene is invalid.
     #[error(transparent)]
     Scene(#[from] SceneError),
@@ -139,12 +151,13 @@ pub enum ValidateError {
 }
 
 /// Names of the questions.
-pub const QUESTIONS: [&str; 10] = [
+pub const QUESTIONS: [&str; 11] = [
     "cantilever",
     "buckling",
     "catenary",
     "hanging-strip",
     "modes",
+    "rods",
     "orders",
     "momentum",
     "contact",
@@ -159,12 +172,13 @@ pub const QUESTIONS: [&str; 10] = [
 /// Returns an error if a case cannot be set up or solved.
 pub fn ask(names: &[String], quick: bool, mut report: impl FnMut(&Finding)) -> Result<Vec<Finding>, ValidateError> {
     type Ask = fn(bool, &mut dyn FnMut(Finding)) -> Result<(), ValidateError>;
-    let all: [Ask; 10] = [
+    let all: [Ask; 11] = [
         cantilever::ask,
         lateral_buckling::ask,
         catenary::ask,
         hanging_strip::ask,
         modes::ask,
+        rods::ask,
         orders::ask,
         momentum::ask,
         contact::ask,
