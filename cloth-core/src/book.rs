@@ -20,3 +20,5 @@ mod first_hour {}
 mod internals {}
 #[doc = include_str!("../../docs/book/glossary.md")]
 mod glossary {}
+#[doc = include_str!("../../docs/book/unknowns.md")]
+mod unknowns {}
