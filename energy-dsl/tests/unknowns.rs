@@ -50,6 +50,14 @@ energy_dsl::energy! {
         k / 2 * trial^2
     }
 
+    /// A spring that creeps, and begins at the length of its rest shape.
+    energy Creeping(x, y: Point; rest u, v: Vec3; state l: Scalar[m] = L, n: [Scalar[1]; 2] = [0, 1]; k: Scalar[N/m]) {
+        rest { let L = norm(u - v); }
+        let e = norm(x - y) - l;
+        next { l = l + e / 10; n = [n[1], n[0] + 1]; }
+        k / 2 * e^2 + 0 * L * n[0] * k * e
+    }
+
     /// Names that look like those of generated code, and vectors in the state.
     constraint Remembered(x, y: Point; state t0, t1: Vec3) {
         next { t0 = unit(x - y) + 0.5 * t0; t1 = t0; }
@@ -107,6 +115,7 @@ fn tapes_have_the_bits_of_generated_code() {
     check::<Ring5<f64>>();
     check::<PlasticSpring<f64>>();
     check::<Remembered<f64>>();
+    check::<Creeping<f64>>();
 }
 
 #[test]
@@ -158,6 +167,16 @@ fn plastic_flow_is_a_state() {
     let jacobians = spring.next_jacobians(&stretched);
     assert_eq!((jacobians.by_unknowns.len(), jacobians.by_state), (6, [1.0]));
     assert!((spring.state_jacobian(&stretched).by_state[3] + 10.0).abs() < 1e-13);
+}
+
+/// A state can begin at rest: `at_rest` computes it from the rest shape and the parameters.
+#[test]
+fn states_begin_at_rest() {
+    let spring = Creeping::<f64>::at_rest([0.0; 3], [3.0, 0.0, 4.0], 2.0).unwrap();
+    assert_eq!(spring.state(), [5.0, 0.0, 1.0]);
+    let next = spring.next(&[0.0, 0.0, 0.0, 6.0, 0.0, 0.0]);
+    assert_eq!(next.state, [5.1, 1.0, 1.0]);
+    assert_eq!(spring.value(&[[0.0; 3], [6.0, 0.0, 0.0]]).value, 1.0);
 }
 
 #[test]

@@ -47,13 +47,17 @@ pub(super) struct Checker<'a> {
     /// Number of calls that were inlined.
     inlined: usize,
     used: BTreeSet<String>,
-    in_rest: bool,
+    pub(super) in_rest: bool,
     /// Number of terms that sums were unrolled to.
     pub(super) terms: usize,
     pub(super) bindings: Vec<Binding>,
     pub(super) reads_velocities: bool,
     /// New values of the state, row by row.
     pub(super) next: Option<Typed>,
+    /// Values at rest that the signature gives the states.
+    pub(super) initial: Vec<(&'a [Name], &'a Expression)>,
+    /// The value of the state at rest, row by row; `None` if it is given with each element.
+    pub(super) at_rest: Option<Typed>,
     budget: &'a Budget,
     /// Whether the budget was spent or an expression too deep, which is reported once.
     spent: bool,
@@ -92,6 +96,8 @@ impl<'a> Checker<'a> {
             bindings: globals.bindings.clone(),
             reads_velocities: false,
             next: None,
+            initial: Vec::new(),
+            at_rest: None,
             budget,
             spent: false,
             level: 0,
@@ -135,6 +141,9 @@ impl<'a> Checker<'a> {
             self.define(&statement.name, value, statement.rest);
         }
         let result = self.expression(&body.result);
+        if outermost {
+            self.at_rest = self.state_at_rest();
+        }
         if let Some(next) = &body.next {
             match outermost {
                 true => self.next = self.next_state(next),

@@ -100,27 +100,32 @@ fn check_declaration(
     let checked = declaration.body.as_ref().and_then(|body| {
         let mut checker = Checker::new(&signature, globals, functions, budget, &mut own);
         checker.declaration = &declaration.name.text;
+        checker.initial = declaration
+            .inputs
+            .iter()
+            .filter_map(|group| Some((group.names.as_slice(), group.initial.as_ref()?)))
+            .collect();
         let result = checker.body(body, true).and_then(|result| checker.check_depth(result))?;
         checker.report_unused(&declaration.name);
-        let (bindings, has_velocities, next) = (checker.bindings, checker.reads_velocities, checker.next);
-        Some((bindings, has_velocities, result, next))
+        let Checker { bindings, reads_velocities, next, at_rest, .. } = checker;
+        Some((bindings, reads_velocities, result, (next, at_rest)))
     });
-    let checked = checked.and_then(|(bindings, has_velocities, result, next)| {
+    let checked = checked.and_then(|(bindings, has_velocities, result, memory)| {
         let body = declaration.body.as_ref()?;
         let result = result::expected(declaration, &signature, result, &body.result.span, &mut own)?;
         next::check_presence(declaration, &signature, body, &mut own);
-        own.0.is_empty().then_some((bindings, has_velocities, result, next))
+        own.0.is_empty().then_some((bindings, has_velocities, result, memory))
     });
     let failed = checked.is_none();
     diagnostics.append(own);
-    let (bindings, has_velocities, result, next) = checked.unwrap_or_else(|| {
+    let (bindings, has_velocities, result, (next, at_rest)) = checked.unwrap_or_else(|| {
         let span = &declaration.name.span;
         let size = signature.parameters[signature.parameters.len() - signature.states..]
             .iter()
             .map(|input| input.input_type.size())
             .sum::<usize>();
         let next = (size > 0).then(|| result::zeros(size, span));
-        (Vec::new(), false, result::stub(declaration.kind, &signature, span), next)
+        (Vec::new(), false, result::stub(declaration.kind, &signature, span), (next, None))
     });
     let program = Program {
         name: declaration.name.text.clone(),
@@ -140,6 +145,7 @@ fn check_declaration(
         parameters: signature.parameters,
         states: signature.states,
         next,
+        at_rest,
         has_velocities,
         bindings,
         result,

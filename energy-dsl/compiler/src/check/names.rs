@@ -94,13 +94,19 @@ impl<'a> Names<'a, '_> {
         // The signature reports inputs that are declared twice.
         self.scopes.push(inputs.map(|name| Entry::new(name, Role::Input, true)).collect());
         if let Some(body) = &declaration.body {
-            self.body(body);
+            let initial = declaration.inputs.iter().filter_map(|group| group.initial.as_ref());
+            self.body_with(body, initial);
         }
         declaration.inputs.iter().filter_map(|group| group.length.as_ref()).for_each(|length| self.expression(length));
         self.close();
     }
 
     fn body(&mut self, body: &'a Body) {
+        self.body_with(body, std::iter::empty());
+    }
+
+    /// Walks a body, and expressions that see its values.
+    fn body_with(&mut self, body: &'a Body, more: impl Iterator<Item = &'a Expression>) {
         self.scopes.push(Vec::new());
         body.functions.iter().for_each(|function| self.define(&function.name, Role::Function));
         for constant in &body.constants {
@@ -113,6 +119,7 @@ impl<'a> Names<'a, '_> {
             self.define(&statement.name, Role::Value);
         }
         self.expression(&body.result);
+        more.for_each(|expression| self.expression(expression));
         if let Some(next) = &body.next {
             for statement in &next.lets {
                 self.expression(&statement.value);
@@ -249,7 +256,7 @@ pub(super) fn mentioned(item: &Item) -> BTreeSet<String> {
         Item::Constant(constant) => mentioned_in(&constant.value, &mut found),
         Item::Declaration(declaration) => {
             declaration.body.iter().for_each(|body| mentioned_in_body(body, &mut found));
-            let lengths = declaration.inputs.iter().filter_map(|group| group.length.as_ref());
+            let lengths = declaration.inputs.iter().flat_map(|group| group.length.iter().chain(&group.initial));
             lengths.for_each(|length| mentioned_in(length, &mut found));
         }
         Item::Specialisation(_) => {}

@@ -240,7 +240,7 @@ fn check_group(declaration: &Declaration, group: &InputGroup, diagnostics: &mut 
         diagnostics.push(Diagnostic::new(&group.type_span, message).help(help.to_owned()));
     };
     let is_unknown = group.section == Section::Moving && group.element != ElementType::Velocity;
-    if is_unknown && declaration.kind != Kind::Residual && !moves_by_numbers(group.element) {
+    if is_unknown && declaration.kind != Kind::Residual && !can_be_unknown(group.element) {
         let message = format!("an unknown of this {kind} cannot have this type");
         let help = "unknowns are Scalar, Vec2, Vec3, Vec4, Point, Point2, Rotation, Motion and arrays of them; parameters \
                     follow the first `;`, as in (p0, p1: Point; k: Scalar)";
@@ -257,8 +257,8 @@ fn check_group(declaration: &Declaration, group: &InputGroup, diagnostics: &mut 
     }
 }
 
-/// Returns whether an unknown of this type moves by three numbers or fewer that are added, or by a rotation.
-fn moves_by_numbers(element: ElementType) -> bool {
+/// Returns whether energies, constraints and forces can have unknowns of this type.
+fn can_be_unknown(element: ElementType) -> bool {
     use ElementType::{Motion, Point, Point2, Rotation, Scalar, Vector};
     matches!(element, Scalar | Vector(_) | Point | Point2 | Rotation | Motion)
 }

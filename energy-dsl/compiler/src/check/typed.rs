@@ -41,6 +41,8 @@ pub struct Program {
     pub states: usize,
     /// New values of the state, row by row; `None` without a state.
     pub next: Option<Typed>,
+    /// Values of the state at rest, row by row; `None` if they are given with each element.
+    pub at_rest: Option<Typed>,
     /// Whether the body reads velocities.
     pub has_velocities: bool,
     /// Intermediate values and constants, in order.
@@ -80,7 +82,14 @@ impl Program {
             _ => zero(&self.span),
         };
         let next = self.next.as_ref().map(|_| super::result::zeros(self.state_size(), &self.span));
-        let stub = Self { bindings: Vec::new(), result, next, budget: Budget::new(Limits::NONE), ..self.clone() };
+        let stub = Self {
+            bindings: Vec::new(),
+            result,
+            next,
+            at_rest: None,
+            budget: Budget::new(Limits::NONE),
+            ..self.clone()
+        };
         stub.without_audit()
     }
 
@@ -205,6 +214,14 @@ impl Typed {
             TypedKind::Select(a, b, c) => vec![&**a, &**b, &**c],
             TypedKind::Gradient(of, ..) => vec![&**of],
             TypedKind::Constant(_) | TypedKind::Pi | TypedKind::Input(..) | TypedKind::Binding(_) => Vec::new(),
+        }
+    }
+
+    /// Returns the entries of an array, or the value itself.
+    pub(crate) fn into_entries(self) -> Vec<Self> {
+        match self.kind {
+            TypedKind::Array(entries) => entries,
+            _ => vec![self],
         }
     }
 

@@ -155,6 +155,7 @@ fn constructor(emitter: &Emitter<'_>) -> TokenStream {
         let result = quote!(::core::result::Result<Self, ::energy_dsl::RestError>);
         (result, body, quote!(Self::new(#(#values),*)))
     };
+    let at_rest = at_rest(emitter, &result);
     let errors = (plan.stored() > 0).then(|| {
         quote! {
             #[doc = ""]
@@ -174,12 +175,61 @@ fn constructor(emitter: &Emitter<'_>) -> TokenStream {
                 #body
             }
 
+            #at_rest
+
             #[allow(unused_variables)]
             fn from_flat(rest: &[T], parameters: &[T]) -> ::core::result::Result<Self, ::energy_dsl::RestError> {
                 #from_flat
             }
         }
     }
+}
+
+/// Emits the constructor of an element whose state begins at rest; nothing if the state is given with each element.
+fn at_rest(emitter: &Emitter<'_>, result: &TokenStream) -> Option<TokenStream> {
+    let Emitter { program, plan, .. } = emitter;
+    let code = plan.at_rest.as_ref()?;
+    let given = || program.rest.iter().chain(&program.parameters[..program.parameters.len() - program.states]);
+    let names: Vec<_> = given().map(|input| format_ident!("{}", input.name)).collect();
+    let types: Vec<_> = given().map(input_type).collect();
+    let rendered = emitter.rendered(code, &mut |input: Input| read_input(&program.rest, &program.parameters, input));
+    let (size, numbers) = (program.state_size(), arranged(Shape::Numbers, &rendered.numbers(&code.groups[0])));
+    let statements = rendered.statements;
+    let mut next = 0_usize;
+    let states = program.state().iter().map(|state| {
+        let mut values: Vec<TokenStream> = (next..next + state.input_type.size()).map(|i| quote!(state[#i])).collect();
+        next += state.input_type.size();
+        for length in state.input_type.dimensions().into_iter().rev() {
+            values = values.chunks(length).map(|entries| quote!([#(#entries),*])).collect();
+        }
+        values.into_iter().collect::<TokenStream>()
+    });
+    let states: Vec<TokenStream> = states.collect();
+    Some(quote! {
+        /// Creates the element with its state at rest, from its rest shape (if any) and its parameters, in declared order.
+        #[doc = ""]
+        #[doc = "# Errors"]
+        #[doc = "Those of `new`, if it has any."]
+        #[inline]
+        #[must_use]
+        pub fn at_rest(#(#names: #types),*) -> #result {
+            #[allow(unused_variables)]
+            struct AtRest<T>(#(#types,)* ::core::marker::PhantomData<T>);
+            impl<T: ::energy_dsl::Real> ::energy_dsl::Kernel for AtRest<T> {
+                type Output = [T; #size];
+
+                #[inline(always)]
+                #[allow(unused_variables)]
+                fn run<L: ::energy_dsl::Level>(self) -> [T; #size] {
+                    let AtRest(#(#names,)* _) = self;
+                    #statements
+                    #numbers
+                }
+            }
+            let state = T::dispatch(AtRest(#(#names,)* ::core::marker::PhantomData));
+            Self::new(#(#names,)* #(#states),*)
+        }
+    })
 }
 
 /// Reads an input inside `new`, where rest shape and parameters are arguments.

@@ -65,6 +65,8 @@ pub struct LoweredProgram {
     pub formula: Formula,
     /// The parts of an element with memory; `None` without a state.
     pub memory: Option<Memory>,
+    /// The state at rest, from the rest shape and the parameters; `None` if it is given with each element.
+    pub at_rest: Option<Formula>,
 }
 
 /// Lowers to the robust form, split into the part that the rest shape determines and the part that moves.
@@ -82,7 +84,12 @@ pub fn lower(program: &Program) -> LoweredProgram {
         .map(|terms| repeated(&terms, &mut rest))
         .filter(|(_, formula)| formula.cost() >= LEAST_COST_OF_LOOPS)
         .map_or_else(|| unrolled(program, &mut rest), |(outputs, formula)| (outputs, formula, None));
-    LoweredProgram { rest: RestFormula { graph: rest.graph, outputs, determinants }, formula, memory }
+    let at_rest = program.at_rest.as_ref().map(|state| {
+        let mut lowering = Lowering::new(program, Form::Robust, None);
+        let outputs = lowering.expression(state).parts;
+        Formula { graph: lowering.graph, outputs, repetition: None }
+    });
+    LoweredProgram { rest: RestFormula { graph: rest.graph, outputs, determinants }, formula, memory, at_rest }
 }
 
 /// Returns the numbers to store, and the formulas.

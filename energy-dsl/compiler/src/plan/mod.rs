@@ -30,6 +30,8 @@ pub(crate) struct Plan {
     pub(crate) shape: usize,
     /// The `rest` block: its results are the stored numbers, and its first flag marks degenerate shapes.
     pub(crate) rest: RoutinePlan,
+    /// The state at rest, from the rest shape and the parameters; `None` if it is given with each element.
+    pub(crate) at_rest: Option<Code>,
     /// The routines of the moving part, or of one term of it. The Hessian of an energy is not among them: it is
     /// expanded from the reduced one.
     pub(crate) routines: Vec<RoutinePlan>,
@@ -53,6 +55,10 @@ impl Plan {
             parameters: program.parameters_size(),
             shape: program.rest.iter().map(|input| input.input_type.size()).sum(),
             rest: RoutinePlan::of_rest(routines),
+            at_rest: routines
+                .at_rest
+                .as_ref()
+                .map(|state| Code::new(&state.graph, std::slice::from_ref(&state.outputs), [None, None])),
             routines: list.map(|(graph, routine)| RoutinePlan::new(routines, graph, routine)).collect(),
             expansion,
             repetition: routines.repetition.clone(),

@@ -172,6 +172,8 @@ pub struct Routines {
     pub rest: RestFormula,
     /// Mask under which the rest shape is degenerate or inverted.
     pub refused: Option<NodeId>,
+    /// The state at rest, from the rest shape and the parameters; `None` if it is given with each element.
+    pub at_rest: Option<Formula>,
     /// Graph of the moving part, or of one term of it.
     pub graph: Graph,
     /// The numbers of each term, if the routines compute one term of a sum.
@@ -263,7 +265,7 @@ impl Expansion {
 #[must_use]
 pub fn differentiate(
     program: &Program,
-    LoweredProgram { mut rest, formula: Formula { mut graph, outputs, repetition }, memory }: LoweredProgram,
+    LoweredProgram { mut rest, formula: Formula { mut graph, outputs, repetition }, memory, at_rest }: LoweredProgram,
 ) -> Routines {
     program.budget.enter(Phase::Differentiating);
     let refused = refused(&mut rest);
@@ -302,6 +304,7 @@ pub fn differentiate(
     Routines {
         rest,
         refused,
+        at_rest,
         list,
         coordinates: coordinates.len(),
         vectors: if program.kind == Kind::Residual || is_mixed { Vec::new() } else { coordinates.vectors.clone() },

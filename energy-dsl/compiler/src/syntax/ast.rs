@@ -214,6 +214,8 @@ pub struct InputGroup {
     pub element: ElementType,
     /// Length of the arrays, as written.
     pub length: Option<Expression>,
+    /// Value at rest of a state; `None` if it is given with each element.
+    pub initial: Option<Expression>,
     /// Place of the type.
     pub type_span: Span,
     /// Unit as written; empty without one.

@@ -385,7 +385,9 @@ impl<'a> Parser<'a> {
             let type_span = self.span();
             let (element, unit, length) = self.input_type()?;
             let section_here = marked.unwrap_or_else(|| section_of(section, element));
-            groups.push(InputGroup { section: section_here, shared, names, element, length, type_span, unit });
+            let has_initial = section_here == Section::State && self.take("=");
+            let initial = has_initial.then(|| self.expression()).transpose()?;
+            groups.push(InputGroup { section: section_here, shared, names, element, length, initial, type_span, unit });
             if self.take(";") {
                 section = Section::Parameter;
                 marked = self.section_word();

@@ -54,13 +54,15 @@ pub(super) fn check(program: &Program, diagnostics: &mut Diagnostics) {
             Kind::Constraint | Kind::Residual => {}
         }
     }
-    let next = program.next.as_ref().map_or_else(Vec::new, Typed::parts);
-    let states = program.state().iter().flat_map(|state| vec![state; state.input_type.length.unwrap_or(1)]);
-    for (value, state) in next.into_iter().zip(states) {
-        let found = inference.expression(value).main();
-        let wanted = inference.parameter(state);
-        let what = format!("the new value of `{}` must have the unit of the state", state.name);
-        inference.result(&found, &wanted, &value.span, &what);
+    for (values, which) in [(&program.next, "new value"), (&program.at_rest, "value at rest")] {
+        let values = values.as_ref().map_or_else(Vec::new, Typed::parts);
+        let states = program.state().iter().flat_map(|state| vec![state; state.input_type.length.unwrap_or(1)]);
+        for (value, state) in values.into_iter().zip(states) {
+            let found = inference.expression(value).main();
+            let wanted = inference.parameter(state);
+            let what = format!("the {which} of `{}` must have the unit of the state", state.name);
+            inference.result(&found, &wanted, &value.span, &what);
+        }
     }
 }
 
