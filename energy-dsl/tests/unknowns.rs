@@ -3,7 +3,7 @@
 
 use energy_compiler::Interpreted;
 use energy_dsl::{
-    Element, FieldKind, Inputs, MixedConstraint, MixedForce, MixedPotential, PackedMixed, Potential, Real, Residual,
+    Element, FieldKind, Inputs, MixedConstraint, MixedForce, MixedPotential, Packed, PackedMixed, Potential, Residual,
     StateSensitivity, Stateful, Stored, triangle_index,
 };
 
@@ -196,18 +196,24 @@ fn kinds_have_their_traits() {
     assert_eq!((packed::<BallJoint>(), packed::<Gas>()), (7, 0));
 }
 
-/// Eight elements in lanes have the bits of one.
+/// Elements in lanes have the bits of single ones.
 #[test]
 fn lanes_have_the_bits_of_scalars() {
-    fn sums<T: Real>(plane: &Plane<T>, u: &[T; 7]) -> [T; 2] {
-        let at = plane.hessian(u);
-        [at.value, at.hessian[27]]
+    const COUNT: usize = 37;
+    let number = |i: usize| (1.0 + i as f64).sin();
+    let planes: Vec<Plane> = (0..COUNT).map(|i| Plane::new(0.7 + number(i) / 2.0)).collect();
+    let unknowns: Vec<f64> = (0..COUNT + 6).map(number).collect();
+    let stencils: Vec<[u32; 7]> =
+        (0..COUNT).map(|i| std::array::from_fn(|place| u32::try_from(i + place).unwrap())).collect();
+    let (mut energies, mut gradients, mut hessians) = ([0.0; COUNT], [0.0; 7 * COUNT], [0.0; 28 * COUNT]);
+    let packed = Packed::new(&planes, &stencils);
+    let flagged = packed.mixed_hessians(0..COUNT, &unknowns, &mut energies, &mut gradients, &mut hessians).unwrap();
+    assert!(flagged.is_empty());
+    for (i, plane) in planes.iter().enumerate() {
+        let at = plane.hessian(&std::array::from_fn(|place| unknowns[i + place]));
+        let bits = |numbers: &[f64]| numbers.iter().map(|x| x.to_bits()).collect::<Vec<_>>();
+        assert_eq!(energies[i].to_bits(), at.value.to_bits());
+        assert_eq!(bits(&gradients[7 * i..7 * i + 7]), bits(&at.gradient));
+        assert_eq!(bits(&hessians[28 * i..28 * i + 28]), bits(&at.hessian));
     }
-    let numbers = |i: usize| (1.0 + i as f64).sin();
-    let plane = Plane::<f64>::new(0.7);
-    let single = sums(&plane, &std::array::from_fn(numbers));
-    let mut packed = [0.0; 16];
-    plane.store(&mut packed, 16);
-    assert_eq!(packed[0], 0.7);
-    assert!(single.iter().all(|x| x.is_finite()));
 }
