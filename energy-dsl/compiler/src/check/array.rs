@@ -1,6 +1,8 @@
 //! Arrays, their entries, components of vectors, and sums over indices. All of them are unrolled: an array is the list
 //! of its entries.
 
+use std::ops::Range;
+
 use super::expression::{Checker, Meaning, constant};
 use super::typed::{Typed, TypedKind};
 use crate::diagnostic::{Diagnostic, Span};
@@ -172,26 +174,51 @@ impl<'a> Checker<'a> {
         }
     }
 
-    /// Checks and unrolls `sum(j in first..end, term)`.
-    #[inline(never)]
-    pub(super) fn sum(&mut self, sum: &'a Sum, span: &Span) -> Option<Typed> {
+    /// Returns the range of an index, and counts its terms.
+    fn range(&mut self, sum: &'a Sum, span: &Span) -> Option<Range<usize>> {
         let (first, end) = (self.whole_number(&sum.first, "a range"), self.whole_number(&sum.end, "a range"));
         let (first, end) = (first?, end?);
         if first >= end {
             let message = format!("the range {first}..{end} is empty");
-            return self.error(&sum.end.span, message);
+            self.error(&sum.end.span, message);
+            return None;
         }
         self.terms += end - first;
         if self.terms > MOST_TERMS {
-            return self.error(span, format!("the sums unroll to more than {MOST_TERMS} terms"));
+            self.error(span, format!("the sums unroll to more than {MOST_TERMS} terms"));
+            return None;
         }
+        Some(first..end)
+    }
+
+    /// Returns the term of an index.
+    fn term(&mut self, sum: &'a Sum, number: usize) -> Option<Typed> {
+        let scope = [(sum.index.canonical(), Some(Meaning::Index(number)))];
+        self.scopes.push(scope.into_iter().collect());
+        let term = self.expression(&sum.term);
+        self.scopes.pop();
+        term
+    }
+
+    /// Checks and unrolls `for j in 0..end { a[j] = term; }` to the array of the terms.
+    #[inline(never)]
+    pub(super) fn each(&mut self, each: &'a Sum, span: &Span) -> Option<Typed> {
+        let range = self.range(each, span)?;
+        if range.start > 0 {
+            return self.error(&each.first.span, "the loop must give every entry a value: it begins at 0");
+        }
+        let length = u16::try_from(range.end).ok()?;
+        let terms: Vec<Typed> = range.map(|number| self.term(each, number)).collect::<Option<_>>()?;
+        Some(Typed { kind: TypedKind::Array(terms), shape: Shape::Array(length), span: span.clone() })
+    }
+
+    /// Checks and unrolls `sum(j in first..end, term)`.
+    #[inline(never)]
+    pub(super) fn sum(&mut self, sum: &'a Sum, span: &Span) -> Option<Typed> {
+        let range = self.range(sum, span)?;
         let mut total: Option<Typed> = None;
-        for number in first..end {
-            let scope = [(sum.index.canonical(), Some(Meaning::Index(number)))];
-            self.scopes.push(scope.into_iter().collect());
-            let term = self.expression(&sum.term);
-            self.scopes.pop();
-            let term = term?;
+        for number in range {
+            let term = self.term(sum, number)?;
             total = Some(match total {
                 None => term,
                 Some(total) => self.apply("+", span, vec![total, term])?,

@@ -234,6 +234,7 @@ impl<'a> Checker<'a> {
             ExpressionKind::Index(of, index) => self.index(of, index),
             ExpressionKind::Component(of, name) => self.component(of, name),
             ExpressionKind::Sum(sum) => self.sum(sum, span),
+            ExpressionKind::Each(each) => self.each(each, span),
         }
     }
 

@@ -161,7 +161,7 @@ impl<'a> Names<'a, '_> {
                 self.expression(index);
             }
             ExpressionKind::Component(of, _) => self.expression(of),
-            ExpressionKind::Sum(sum) => {
+            ExpressionKind::Sum(sum) | ExpressionKind::Each(sum) => {
                 self.expression(&sum.first);
                 self.expression(&sum.end);
                 self.scopes.push(Vec::new());
@@ -291,7 +291,7 @@ fn mentioned_in(expression: &Expression, found: &mut BTreeSet<String>) {
         ExpressionKind::List(items) => items.iter().for_each(|item| mentioned_in(item, found)),
         ExpressionKind::Index(of, index) => [of, index].into_iter().for_each(|part| mentioned_in(part, found)),
         ExpressionKind::Component(of, _) => mentioned_in(of, found),
-        ExpressionKind::Sum(sum) => {
+        ExpressionKind::Sum(sum) | ExpressionKind::Each(sum) => {
             [&sum.first, &sum.end, &sum.term].into_iter().for_each(|part| mentioned_in(part, found));
         }
         ExpressionKind::Body(body) => mentioned_in_body(body, found),

@@ -71,6 +71,9 @@ fn parts(of: &Expression) -> (String, u8) {
         ExpressionKind::Component(of, name) => {
             (format!("<msub>{}{}</msub>", expression(of, 5), identifier(&name.text)), 5)
         }
+        ExpressionKind::Each(each) => {
+            (format!("<msub>{}{}</msub>", expression(&each.term, 5), identifier(&each.index.text)), 5)
+        }
         ExpressionKind::Sum(sum) => {
             let index = identifier(&sum.index.text);
             let (first, end) = (expression(&sum.first, 0), expression(&sum.end, 0));

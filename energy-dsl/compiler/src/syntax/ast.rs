@@ -330,6 +330,8 @@ pub enum ExpressionKind {
     Component(Box<Expression>, Name),
     /// `sum(j in first..end, term)`.
     Sum(Box<Sum>),
+    /// `for j in first..end { a[j] = term; }` in `next`: the array of the terms.
+    Each(Box<Sum>),
     /// A body in braces or in a string.
     Body(Box<Body>),
 }

@@ -7,6 +7,7 @@ mod expression;
 pub(crate) mod habits;
 mod lengths;
 mod name;
+mod next;
 mod notation;
 mod parse;
 mod specialise;

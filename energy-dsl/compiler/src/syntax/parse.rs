@@ -3,7 +3,7 @@
 use proc_macro2::TokenStream;
 
 use super::ast::{
-    Body, Constant, Declaration, ElementType, Expression, ExpressionKind, InputGroup, Item, Let, Next, Section, Unit,
+    Body, Constant, Declaration, ElementType, Expression, ExpressionKind, InputGroup, Item, Let, Section, Unit,
     UserFunction,
 };
 use super::attribute::Attributes;
@@ -228,7 +228,7 @@ impl<'a> Parser<'a> {
     }
 
     /// Counts a definition. Checking compares each with all others.
-    fn count_definition(&mut self) -> Parsed<()> {
+    pub(super) fn count_definition(&mut self) -> Parsed<()> {
         self.definitions += 1;
         if self.definitions <= MOST_DEFINITIONS {
             return Ok(());
@@ -407,7 +407,7 @@ impl<'a> Parser<'a> {
     }
 
     /// Takes a word that is also a legal name, if another name follows it.
-    fn take_word_before_name(&mut self, word: &str) -> bool {
+    pub(super) fn take_word_before_name(&mut self, word: &str) -> bool {
         let names_follow = matches!(self.tokens.get(self.at + 1), Some(Token { kind: TokenKind::Name(_), .. }));
         let found = self.is_word(word) && names_follow;
         self.at += usize::from(found);
@@ -567,40 +567,12 @@ impl<'a> Parser<'a> {
         Ok(Body { constants, functions: body.0, lets: body.1, next, result: Box::new(result) })
     }
 
-    /// Parses `next { a = …; … }`, if it is here.
-    fn next_block(&mut self, is_second: bool) -> Parsed<Option<Next>> {
-        if !self.is_word("next") || self.tokens.get(self.at + 1).is_none_or(|token| token.text != "{") {
-            return Ok(None);
-        }
-        let span = self.span();
-        if is_second {
-            return Err(Box::new(
-                Diagnostic::new(&span, "a body has one `next` block").help("put all new states into it"),
-            ));
-        }
-        self.at += 2;
-        let mut next = Next { lets: Vec::new(), assignments: Vec::new(), span };
-        while !self.take("}") {
-            if self.is_word("let") {
-                next.lets.push(self.statement(false)?);
-                continue;
-            }
-            self.count_definition()?;
-            let name = self.name("the name of a state, as in next { a = b; }, or `let`")?;
-            self.expect("=", "and the new value of the state")?;
-            let value = self.expression()?;
-            self.expect(";", "after the new value")?;
-            next.assignments.push(Let { name, value, rest: false });
-        }
-        Ok(Some(next))
-    }
-
     fn next_is_definition(&self) -> bool {
         matches!(self.peek(), Some(Token { kind: TokenKind::Name(_), .. }))
             && self.tokens.get(self.at + 1).is_some_and(|t| t.kind == TokenKind::Symbol("=".into()))
     }
 
-    fn statement(&mut self, rest: bool) -> Parsed<Let> {
+    pub(super) fn statement(&mut self, rest: bool) -> Parsed<Let> {
         self.count_definition()?;
         let has_let = self.take_word("let");
         if has_let && self.is_word("mut") && matches!(self.tokens.get(self.at + 1), Some(t) if t.text != "=") {
