@@ -8,7 +8,7 @@ use energy_compiler::Elements as Tapes;
 use energy_dsl::{Declaration, Element as _, Kind, energy};
 use energy_solve::{Character, Order, OwnLaw, OwnResults, OwnTerm, SteeredTapeTerm, SteeredTapes, Term};
 use numpy::{PyArray1, PyArrayMethods, PyUntypedArrayMethods};
-use pyo3::exceptions::{PyTypeError, PyValueError};
+use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
 
