@@ -2,6 +2,7 @@
 
 mod ast;
 mod attribute;
+mod body;
 pub(crate) mod characters;
 mod expression;
 pub(crate) mod habits;
