@@ -212,7 +212,7 @@ def test_unknowns_of_any_type():
     np.testing.assert_array_equal(force, [[-2, -2, -2, -1, -2, -2]])
     assert (by_u.shape, by_v.shape) == ((1, 6, 6), (1, 6, 6))
     with pytest.raises(ValueError, match=r"u: expected .*\(2, 5\)"):
-        aim.energy(u[:, :4].repeat(1, axis=0), **inputs)
+        aim.value(u[:, :4], **inputs)
     with pytest.raises(TypeError, match="not only points of its own"):
         ed.System(3).add(aim, [[0]], **inputs)
 
