@@ -11,6 +11,7 @@ mod functions;
 mod near_singularities;
 mod printed_mistakes;
 mod random_programs;
+mod random_unknowns;
 mod sampling;
 mod series_remainders;
 mod singular_programs;

@@ -157,6 +157,14 @@ fn equalities_that_hold_in_a_region_are_accepted() {
     }
 }
 
+/// The velocity of an angle is no velocity of a point.
+#[test]
+fn a_velocity_has_the_unit_of_its_unknown() {
+    let source = "force A(_θ: Scalar[rad], ω: Velocity; c: Scalar[N s/m]) { [-c * ω] }";
+    let error = Textbook::from_source(source).unwrap_err().to_string();
+    assert!(error.contains("unit"), "{error}");
+}
+
 /// Correct units are accepted, including inferred ones.
 #[test]
 fn right_units_are_accepted() {
@@ -170,6 +178,10 @@ fn right_units_are_accepted() {
         "energy A(p, q: Point; E: Scalar[\"kg·m²/s²\"], a: Scalar[1/m]) { E * exp(-a * norm(p - q)) }",
         "energy A(x1, x2, x3, x4: Point; k: Scalar[J], w: Scalar) { k * dihedral(x1, x2, x3, x4) * atan2(w, w + 1) }",
         "force A(_p: Point, v: Velocity; c: Scalar[N s/m]) { -c * v }",
+        // A velocity has the unit of its unknown, by time.
+        "force A(_θ: Scalar[rad], ω: Velocity; c: Scalar[N m s]) { [-c * ω] }",
+        "force A(_s: Scalar[m], v: Velocity; c: Scalar[N s/m]) { [-c * v] }",
+        "force A(_q: Rotation, ω: Velocity; c: Scalar[N m s]) { [-c * ω] }",
         "residual A(ξ: Twist; p: Vec3[m]) { vector(norm(p), angular(ξ).x, dot(linear(ξ), p)) }",
         "constraint A(p, q: Point; L: Scalar[m]) { [norm(p - q) - L, dot(p, q) / L^2] }",
         // Singular values have the unit of their matrix.

@@ -64,6 +64,10 @@ impl Auditor<'_> {
     pub(super) fn outside(&mut self, sample: &Sample) {
         let Ok(answer) = self.answer(sample) else { return };
         let Some(block) = answer.blocks.first() else { return };
+        if !rows(&self.subject.formula, sample).iter().any(|row| row.is_nan()) {
+            // Only the next state has no value. Its routine has flags of its own.
+            return;
+        }
         let error = if answer.flags[0].degenerate { 0.0 } else { f64::INFINITY };
         let declaration = self.declaration;
         self.note(Check::Outside, block.name, error, sample, || {

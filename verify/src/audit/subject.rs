@@ -197,14 +197,15 @@ impl Subject {
         Ok(answer)
     }
 
-    /// Whether the formula has a value at an input, by doubles.
+    /// Whether the formula and the next state have a value at an input, by doubles.
     fn has_value(&self, sample: &Sample) -> bool {
         self.meter.formula();
-        !rows(&self.formula, sample).iter().any(|row| row.is_nan())
+        let next = self.formula.evaluate_next(&sample.inputs());
+        !rows(&self.formula, sample).iter().chain(&next).any(|row| row.is_nan())
     }
 
-    /// Whether the formula has no value at an input and its surroundings: they are outside of its domain. At an input
-    /// where it is 0/0, it has values nearby.
+    /// Whether the formula or the next state has no value at an input and its surroundings: they are outside of its
+    /// domain. At an input where it is 0/0, it has values nearby.
     pub(super) fn is_outside(&self, sample: &Sample) -> bool {
         const NEARBY: f64 = 1.0 / (1 << 20) as f64;
         if self.has_value(sample) {

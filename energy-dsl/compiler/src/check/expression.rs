@@ -413,9 +413,17 @@ impl<'a> Checker<'a> {
         let name = if name == "neg" { "-" } else { name };
         if let Some(array) = array {
             let message = format!("`{name}` does not take {array}");
-            self.diagnostics.push(
-                Diagnostic::new(span, message).help("take its entries: a[0], a[1], …, or sum(j in 0..4, … a[j] …)"),
-            );
+            let literal = arguments.iter().find_map(|argument| match &argument.kind {
+                TypedKind::Array(entries) if argument.shape == Shape::Array(3) => Some(entries),
+                _ => None,
+            });
+            let help = match literal {
+                Some(entries) if entries.iter().all(|entry| entry.shape == Shape::Scalar) => {
+                    "take its entries: a[0], a[1], …, or write a vector as vector(a, b, c)"
+                }
+                _ => "take its entries: a[0], a[1], …, or sum(j in 0..4, … a[j] …)",
+            };
+            self.diagnostics.push(Diagnostic::new(span, message).help(help));
             return None;
         }
         match (function.shape)(&shapes) {

@@ -128,7 +128,8 @@ impl Signature {
         }
     }
 
-    /// Gives each velocity to the unknown with its number. Velocities are numbered by increments.
+    /// Gives each velocity to the unknown with its number, and as many components as its increment has. Velocities are
+    /// numbered by increments.
     fn assign_velocities(&mut self, velocities: usize, diagnostics: &mut Diagnostics) {
         let mut firsts = Vec::with_capacity(self.moving.len());
         let mut next = 0;
@@ -138,22 +139,24 @@ impl Signature {
             next += increments;
         }
         for name in self.names.iter_mut().filter(|name| name.source == Source::Velocity) {
-            let number = name.first / 3;
-            let given = &firsts[firsts.len().min(number)..firsts.len().min(number + name.length.unwrap_or(1))];
-            if given.len() < name.length.unwrap_or(1) {
+            let (number, length) = (name.first / 3, name.length.unwrap_or(1));
+            let given = &firsts[firsts.len().min(number)..firsts.len().min(number + length)];
+            if given.len() < length {
                 let message = format!("{velocities} velocities for {} points: expected at most one each", firsts.len());
                 diagnostics.push(Diagnostic::new(&name.name.span, message));
                 return;
             }
-            if let Some(other) = given.iter().position(|(_, increments)| *increments != 3) {
-                let of = &self.moving[number + other].name;
-                let message =
-                    format!("`{}` would be the velocity of `{of}`, which is no point or rotation", name.name.text);
-                let help = "velocities belong to the unknowns in declared order: put points and rotations first";
+            let Some(&(first, increments)) = given.first() else { continue };
+            if let Some(other) = given.iter().position(|(_, others)| *others != increments) {
+                let [of, other] = [number, number + other].map(|unknown| &self.moving[unknown].name);
+                let message = format!("`{}` would have velocities of `{of}` and of `{other}`", name.name.text);
+                let help =
+                    "velocities belong to the unknowns in declared order; an array of them to unknowns of one size";
                 diagnostics.push(Diagnostic::new(&name.name.span, message).help(help));
                 return;
             }
-            name.first = given.first().map_or(0, |(first, _)| *first);
+            name.first = first;
+            name.shape = if increments == 1 { Shape::Scalar } else { Shape::Vector(increments as u8) };
         }
     }
 

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::graph::{Graph, NodeId, Op};
+use crate::graph::{Graph, Input, NodeId, Op};
 
 /// Rounding errors of a result, as multiples of its magnitude: 32 roundoffs, in double and in single precision.
 const ROUNDING: (f64, f64) = (32.0 / (1_u64 << 53) as f64, 32.0 / (1_u64 << 24) as f64);
@@ -40,6 +40,10 @@ impl Magnitudes {
     }
 
     fn combined(&self, g: &mut Graph, node: NodeId) -> NodeId {
+        if let Op::Input(Input::Increment(_)) = g.op(node) {
+            // An increment is 0, but the rotation that it turns is rounded: by as much as an increment of one roundoff.
+            return g.constant(1.0);
+        }
         let size = g.abs(node);
         let m = |node: NodeId| self.0[&node];
         if let Some(rule) = g.rule(node).cloned() {

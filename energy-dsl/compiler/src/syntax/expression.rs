@@ -287,19 +287,24 @@ impl<'a> Parser<'a> {
         const FORM: &str = "as in sum(j in 0..4, w[j] * x[j])";
         self.expect("(", FORM)?;
         self.bars.push("(".into());
-        let index = self.name(&format!("an index, {FORM}"))?;
-        if !self.take_word("in") {
-            return self.fail(&format!("`in` and a range, {FORM}"));
-        }
-        let first = self.expression()?;
-        self.expect("..", &format!("between the ends of the range, {FORM}"))?;
-        let end = self.expression()?;
+        let (index, first, end) = self.index_range(FORM)?;
         self.expect(",", &format!("and what is summed, {FORM}"))?;
         let term = self.expression()?;
         self.take(",");
         self.bars.pop();
         self.expect(")", "to close `sum(`")?;
         Ok(Expression { kind: ExpressionKind::Sum(Box::new(Sum { index, first, end, term })), span })
+    }
+
+    /// Parses `j in first..end`, part of an expression of the given form.
+    pub(super) fn index_range(&mut self, form: &str) -> Parsed<(Name, Expression, Expression)> {
+        let index = self.name(&format!("an index, {form}"))?;
+        if !self.take_word("in") {
+            return self.fail(&format!("`in` and a range, {form}"));
+        }
+        let first = self.expression()?;
+        self.expect("..", &format!("between the ends of the range, {form}"))?;
+        Ok((index, first, self.expression()?))
     }
 
     fn conditional(&mut self) -> Parsed<Expression> {

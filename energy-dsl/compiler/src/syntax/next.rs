@@ -40,13 +40,7 @@ impl Parser<'_> {
     /// Parses `j in 0..4 { a[j] = …; … }` after the word `for`.
     fn each_entry(&mut self) -> Parsed<Vec<Let>> {
         const FORM: &str = "as in for j in 0..4 { a[j] = b[j]; }";
-        let index = self.name(&format!("an index, {FORM}"))?;
-        if !self.take_word("in") {
-            return self.fail(&format!("`in` and a range, {FORM}"));
-        }
-        let first = self.expression()?;
-        self.expect("..", &format!("between the ends of the range, {FORM}"))?;
-        let end = self.expression()?;
+        let (index, first, end) = self.index_range(FORM)?;
         self.expect("{", FORM)?;
         let mut assignments = Vec::new();
         while !self.take("}") {

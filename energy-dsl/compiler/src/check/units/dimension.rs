@@ -24,7 +24,7 @@ pub(super) fn is_zero(exponent: f64) -> bool {
 pub(super) const NUMBER: Exponents = [0.0, 0.0, 0.0, 0.0];
 pub(super) const LENGTH: Exponents = [0.0, 1.0, 0.0, 0.0];
 pub(super) const VELOCITY: Exponents = [0.0, 1.0, -1.0, 0.0];
-pub(super) const FREQUENCY: Exponents = [0.0, 0.0, -1.0, 0.0];
+pub(super) const TIME: Exponents = [0.0, 0.0, 1.0, 0.0];
 pub(super) const FORCE: Exponents = [1.0, 1.0, -2.0, 0.0];
 pub(super) const ENERGY: Exponents = [1.0, 2.0, -2.0, 0.0];
 
@@ -32,7 +32,7 @@ pub(super) const ENERGY: Exponents = [1.0, 2.0, -2.0, 0.0];
 const UNITS: &[(&str, Exponents)] = &[
     ("kg", [1.0, 0.0, 0.0, 0.0]),
     ("m", LENGTH),
-    ("s", [0.0, 0.0, 1.0, 0.0]),
+    ("s", TIME),
     ("N", FORCE),
     ("J", ENERGY),
     ("Pa", [1.0, -1.0, -2.0, 0.0]),

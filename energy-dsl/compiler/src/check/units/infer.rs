@@ -1,13 +1,12 @@
 //! Walks the typed program and collects the equations between units.
 
-use super::dimension::{Dimension, FREQUENCY, LENGTH, VELOCITY};
+use super::dimension::{Dimension, LENGTH, TIME, VELOCITY};
 use super::solver::Solver;
 use super::{declared, rules};
 use crate::check::constant::evaluate;
 use crate::check::typed::{Input, Program, Source, Typed, TypedKind};
 use crate::diagnostic::{Diagnostic, Diagnostics, Span};
 use crate::functions::Shape;
-use crate::syntax::ElementType;
 
 /// The dimensions of a value: one; two for a dual quaternion (its parts), for a twist (θ and t) and for a motion (rotation
 /// and position).
@@ -153,16 +152,16 @@ impl<'a> Inference<'a> {
         units
     }
 
-    /// Returns the dimension of the velocity whose first component is this increment.
-    fn rate(&self, first: usize) -> Dimension {
-        let mut next = 0;
-        let owner = self.program.moving.iter().find(|input| {
+    /// Returns the dimension of the velocity whose first component is this increment: of its unknown, by time.
+    fn rate(&mut self, first: usize) -> Dimension {
+        let (mut next, program) = (0, self.program);
+        let owner = program.moving.iter().find(|input| {
             next += input.input_type.element.increments();
             first < next
         });
-        match owner.map(|input| input.input_type.element) {
-            Some(ElementType::Rotation) => Dimension::of(FREQUENCY),
-            _ => Dimension::of(VELOCITY),
+        match owner {
+            Some(unknown) => self.unknown(unknown).over(&Dimension::of(TIME)),
+            None => Dimension::of(VELOCITY),
         }
     }
 

@@ -46,10 +46,11 @@ pub(super) fn check(program: &Program, diagnostics: &mut Diagnostics) {
                 let unknown = &program.moving[number];
                 let wanted = Dimension::of(ENERGY).over(&inference.unknown(unknown));
                 let what = match unknown.input_type.element {
-                    ElementType::Rotation => "a torque must come out in N m",
-                    _ => "a force must come out in N",
+                    ElementType::Rotation => "a torque must come out in N m".into(),
+                    ElementType::Point | ElementType::Point2 => "a force must come out in N".into(),
+                    _ => format!("the force on `{}` must come out in J over its unit", unknown.name),
                 };
-                inference.result(&found, &wanted, &result.span, what);
+                inference.result(&found, &wanted, &result.span, &what);
             }
             Kind::Constraint | Kind::Residual => {}
         }

@@ -1,0 +1,129 @@
+//! Random declarations over all types of unknowns, with states, velocities and shared unknowns: their audits.
+
+use std::fmt::Write;
+
+use fastrand::Rng;
+use verify::audit::{Options, Target, audit_all, describe_failure};
+
+/// An unknown: its type, its name.
+struct Unknown(&'static str, String);
+
+/// Returns a random 3-vector that moves with this unknown.
+fn vector(rng: &mut Rng, Unknown(of, name): &Unknown, by: &str) -> String {
+    match *of {
+        "Point" => name.clone(),
+        "Point2" => format!("vector({name}.x, {name}.y, 0.3)"),
+        "Scalar" => format!("(c + d + {name} * {by})"),
+        "Rotation" if by == "c" => format!("rotate({name}, c)"),
+        // The product of two vectors that one rotation turns does not depend on it: its derivatives are rounding errors.
+        "Rotation" => format!("(rotate({name}, {by}) + 0.5 * c)"),
+        "Motion" => format!("transform({name}, {by})"),
+        _ => format!("({name}[{}] - 0.2 * {name}[{}])", rng.usize(0..3), rng.usize(0..3)),
+    }
+}
+
+/// Returns a random smooth scalar of the unknowns. Edges of domains and of absolute values are inside of the range.
+fn scalar(rng: &mut Rng, unknowns: &[Unknown]) -> String {
+    let [a, b] = ["c", "d"].map(|by| {
+        let unknown = &unknowns[rng.usize(0..unknowns.len())];
+        vector(rng, unknown, by)
+    });
+    let terms = [
+        format!("dot({a}, {b})"),
+        format!("norm({a} - 1.7 * d)"),
+        format!("sin(dot({a}, d)) * k"),
+        format!("exp(0.3 * tanh(dot({a}, {b})))"),
+        format!("norm_squared({a} + 0.3 * cross({b}, d))"),
+        format!("log(1 + norm_squared({b}))"),
+        format!("sqrt(1 + norm_squared({a} - {b}))"),
+        format!("sqrt(4 + dot({a}, d))"),
+        format!("log(3 + sin(dot({a}, d)))"),
+        format!("interpolate([0, k, 2, 1.5], dot({a}, d))"),
+        format!("abs(dot({a}, {b}) - k)"),
+        format!("max(dot({a}, d), 0.3 * k)"),
+        format!("(2 + dot({a}, d)^2)^1.3"),
+        format!("asin(0.5 * tanh(dot({a}, {b})))"),
+        format!("angle({a}, d)"),
+        format!("atan2(dot({a}, d), 2 + norm({b}))"),
+        format!("acos(dot({a}, d) / (1 + norm({a}) * norm(d) + norm({b})))"),
+        format!("norm(unit({a}) - unit({b} + 2 * d))"),
+    ];
+    terms[rng.usize(0..terms.len())].clone()
+}
+
+/// Returns the force on an unknown: its resistance to a velocity, and a part that no potential has.
+fn force(rng: &mut Rng, unknowns: &[Unknown], on: &Unknown, velocity: &str) -> String {
+    let strength = scalar(rng, unknowns);
+    match on.0 {
+        "Scalar" => format!("{strength} - k^2 * {velocity}"),
+        "Point2" => format!("{strength} * vector(d.x, d.y) - k^2 * {velocity}"),
+        _ => format!("{strength} * cross(c, d) - k^2 * {velocity}"),
+    }
+}
+
+fn declaration(rng: &mut Rng, number: usize) -> String {
+    const TYPES: [&str; 6] = ["Scalar", "Rotation", "Point", "Point2", "Motion", "[Point; 3]"];
+    let kind = ["energy", "energy", "energy", "constraint", "residual", "force"][rng.usize(0..6)];
+    let types = match kind {
+        "residual" => 3,
+        "force" => 4,
+        _ => TYPES.len(),
+    };
+    let mut inputs = Vec::new();
+    let unknowns: Vec<Unknown> = (0..rng.usize(1..4))
+        .map(|i| {
+            let unknown = Unknown(TYPES[rng.usize(0..types)], format!("u{i}"));
+            let shared = kind == "energy" && unknown.0 != "[Point; 3]" && rng.u8(0..4) == 0;
+            inputs.push(format!("{}{}: {}", if shared { "shared " } else { "" }, unknown.1, unknown.0));
+            unknown
+        })
+        .collect();
+    if kind == "force" {
+        inputs.extend((0..unknowns.len()).map(|i| format!("v{i}: Velocity")));
+    }
+    // Each input is used.
+    let mut value = format!("{} + {} + 0.1 * k * dot(c, d)", scalar(rng, &unknowns), scalar(rng, &unknowns));
+    for unknown in &unknowns {
+        write!(value, " * (2 + dot({}, c))", vector(rng, unknown, "d")).unwrap();
+        if unknown.0 == "[Point; 3]" {
+            write!(value, " + norm_squared({0}[0] + {0}[1] + {0}[2] - c)", unknown.1).unwrap();
+        }
+    }
+    let (mut state, mut next) = (String::new(), String::new());
+    if rng.bool() {
+        state = "state m: Scalar, w: Vec3; ".into();
+        let moved = vector(rng, &unknowns[0], "c");
+        let direction = [format!("unit(2 * w + {moved})"), format!("w + 0.1 * m * {moved}")];
+        let m = scalar(rng, &unknowns);
+        next = format!("next {{ m = 0.5 * m + {m}; w = {}; }} ", direction[rng.usize(0..2)]);
+        write!(value, " + m * dot(w, {}) + m^2", vector(rng, &unknowns[0], "c")).unwrap();
+    }
+    let result = match kind {
+        "residual" => {
+            let [second, third] = [scalar(rng, &unknowns), vector(rng, &unknowns[0], "c")];
+            format!("vector({value}, {second}, dot({third}, d))")
+        }
+        "force" => {
+            let mut forces: Vec<String> =
+                unknowns.iter().enumerate().map(|(i, on)| force(rng, &unknowns, on, &format!("v{i}"))).collect();
+            let first = ["1", "vector(1, 1, 1)", "vector(1, 1)"]
+                [usize::from(unknowns[0].0 != "Scalar") + usize::from(unknowns[0].0 == "Point2")];
+            write!(forces[0], " + 0.01 * ({value}) * {first}").unwrap();
+            format!("[{}]", forces.join(", "))
+        }
+        _ => value,
+    };
+    format!("{kind} F{number}({}; {state}c, d: Vec3, k: Scalar) {{ {next}{result} }}\n", inputs.join(", "))
+}
+
+/// Every block equals multi-precision, dual numbers and differences.
+#[test]
+fn audits_of_random_declarations_pass() {
+    let seed = std::env::var("SEED").map_or(20_261_129, |seed| seed.parse().expect("SEED is a number"));
+    let mut rng = Rng::with_seed(seed);
+    let text: String = (0..24).map(|number| declaration(&mut rng, number)).collect();
+    let targets = Target::of_text(&text, "random.energy").unwrap_or_else(|errors| panic!("{text}\n{errors}"));
+    let report = audit_all(&targets, None, Options::quick());
+    let failures: Vec<String> = report.failures().map(describe_failure).collect();
+    assert!(failures.is_empty() && report.refused.is_empty(), "{text}\n{}\n{:?}", failures.join("\n"), report.refused);
+}
