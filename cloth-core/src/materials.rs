@@ -21,6 +21,7 @@ pub static ELEMENTS: &[AnyElement] = entries![
     BridsonForce,
     BridsonForceDamped,
     CapsuleContact,
+    CurledHair,
     DistanceBarrier,
     FlatBending,
     Gravity,

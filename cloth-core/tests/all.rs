@@ -2,6 +2,7 @@
 #![allow(missing_docs)]
 
 mod command_line;
+mod curled_hair;
 mod damping;
 mod deforming_obstacles;
 mod drills;

@@ -98,14 +98,18 @@ fn killed_after_first_checkpoint(scene: &str) -> TempDir {
     let folder = with_scene(scene);
     let mut child = started(&["run", "scene.toml", "-o", "half", "--checkpoint", "4"], folder.path());
     // Kill it without notice once there is a checkpoint.
-    let (start, checkpoint) = (Instant::now(), folder.path().join("half/checkpoint"));
+    wait_for_checkpoint(&folder.path().join("half/checkpoint"));
+    child.kill().unwrap();
+    child.wait().unwrap();
+    folder
+}
+
+fn wait_for_checkpoint(checkpoint: &Path) {
+    let start = Instant::now();
     while !checkpoint.exists() {
         assert!(start.elapsed() < Duration::from_secs(120), "no checkpoint was written");
         std::thread::sleep(Duration::from_millis(1));
     }
-    child.kill().unwrap();
-    child.wait().unwrap();
-    folder
 }
 
 fn started(arguments: &[&str], folder: &Path) -> Child {
@@ -134,6 +138,62 @@ fn a_resumed_run_is_bit_identical() {
             assert!(whole == half, "{integrator}: {name} differs");
         }
     }
+}
+
+/// Hinges that fold for good beyond a moment, and threads that creep. The step is a number of the formula.
+const MEMORY: &str = r#"
+energy PlasticHinge(x0, x1, x2, x3: Point; state ψ: Scalar = 0; k: Scalar[J], θ0, Y: Scalar) {
+    let θ = dihedral(x0, x1, x2, x3) - θ0 - ψ;
+    next { ψ = if abs(θ) > Y { ψ + θ - sign(θ) * Y } else { ψ }; }
+    k / 2 * θ^2
+}
+
+#[time_step(h)]
+energy Creep(p, q: Point; state l: Scalar[m] = L; c: Scalar[N/m], L: Scalar[m], τ, h: Scalar[s]) {
+    let e = norm(p - q) - l;
+    next { l = l + h / (h + τ) * e; }
+    c / 2 * τ / (τ + h) * e^2
+}
+"#;
+
+/// Memory of a file's elements is kept in checkpoints, and taken back with rejected steps.
+#[test]
+fn a_resumed_run_keeps_the_memory_of_declared_elements() {
+    let built =
+        "[garment.fabric.material.stvk]\nstretch_stiffness = 40.0\npoisson_ratio = 0.3\nbending.flat.stiffness = 1e-5";
+    let text = |limit: f64| {
+        let own = format!(
+            "[garment.fabric.material.file]\npath = \"memory.energy\"\n\
+             parameters = {{ k = 1e-4, Y = {limit}, c = 40.0, \"τ\" = 0.5 }}"
+        );
+        SCENE.replace(built, &own).replace("integrator = \"newton\"", "integrator = \"newton\"\nadaptive = true")
+    };
+    assert_ne!(text(0.02), SCENE);
+    let folder = with_scene(&text(0.02));
+    std::fs::write(folder.path().join("memory.energy"), MEMORY).unwrap();
+    let mut child = started(&["run", "scene.toml", "-o", "half", "--checkpoint", "4"], folder.path());
+    wait_for_checkpoint(&folder.path().join("half/checkpoint"));
+    child.kill().unwrap();
+    child.wait().unwrap();
+    succeeds(&["run", "scene.toml", "-o", "whole"], folder.path());
+    succeeds(&["resume", "half"], folder.path());
+    for name in REPEATABLE {
+        let [whole, half] = ["whole", "half"].map(|run| read(&folder.path().join(run), name));
+        assert!(whole == half, "{name} differs");
+    }
+    // Without yield the cloth moves otherwise.
+    std::fs::write(folder.path().join("elastic.toml"), text(100.0)).unwrap();
+    succeeds(&["run", "elastic.toml", "-o", "elastic"], folder.path());
+    let [plastic, elastic] = ["whole", "elastic"].map(|run| read(&folder.path().join(run), "frames/cloth_0015.obj"));
+    assert!(plastic != elastic);
+    // A state without a value at rest, and a time step given as a parameter.
+    std::fs::write(folder.path().join("memory.energy"), MEMORY.replace(" = L;", ";")).unwrap();
+    let message = refused(&["run", "scene.toml", "-o", "bad"], folder.path());
+    assert!(message.contains("Creep is an energy whose state `l` has no value at rest"), "{message}");
+    std::fs::write(folder.path().join("memory.energy"), MEMORY).unwrap();
+    std::fs::write(folder.path().join("scene.toml"), text(0.02).replace("c = 40.0", "c = 40.0, h = 0.1")).unwrap();
+    let message = refused(&["run", "scene.toml", "-o", "bad"], folder.path());
+    assert!(message.contains("no element has a parameter `h`"), "{message}");
 }
 
 #[test]

@@ -119,6 +119,7 @@ macro_rules! for_each_mixed_element {
         $callback! {
             BallJoint,
             BodyAnchor,
+            CurledHair,
             EnclosedVolume,
             GasReservoir,
             HingeAxis,

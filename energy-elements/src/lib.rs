@@ -64,7 +64,7 @@ elements! {
     pressure: Pressure;
     quadratic_hinge: QuadraticHinge;
     rigid_joints: BallJoint, BodyAnchor, HingeAxis;
-    rod: RodBend, RodBendAnisotropic, RodTwist;
+    rod: CurledHair, RodBend, RodBendAnisotropic, RodTwist;
     sliding_friction: SlidingFriction;
     sphere_contact: SphereContact;
     spring: Spring;

@@ -62,4 +62,31 @@ energy! {
         next { t0 = a; t1 = b; d0 = unit(u); d1 = unit(v); }
         (B1 * (dot(binormal, m) / 2 - l * κ1)^2 + B2 * (dot(binormal, n) / 2 - l * κ2)^2) / (2 * l)
     }
+
+    /// Bending and twist of a round hair with a natural curvature κ and a natural torsion τ, at the middle of three
+    /// points: B/2l ‖κb − l κ d̄‖² + C/2l (φ − l τ)², but that ‖d̄‖² counts as 1. κb is the curvature binormal, d̄ the mean
+    /// of the directors of both edges, φ the twist between them, and l half the sum of the edges' lengths at rest.
+    ///
+    /// Directors are unit vectors across the edges that turn with the hair. They stay where they are in the material
+    /// during a step: d moves from the tangent t of the last step to the present one without twist. Whoever sums the
+    /// elements may turn the directors between steps, as hair without inertia about its axis does: it is in equilibrium
+    /// at any time (Bergou, Wardetzky, Robinson, Audoly and Grinspun 2008). A tangent must not turn by half a turn
+    /// within a step.
+    #[audit]
+    #[invariant(translation)]
+    pub energy CurledHair(
+        x0, x1, x2: Point;
+        state t0, t1, d0, d1: Vec3[1];
+        B, C: Scalar[N m^2], l: Scalar[m], κ, τ: Scalar[1/m]
+    ) {
+        let a = unit(x1 - x0);
+        let b = unit(x2 - x1);
+        let u = transported(d0, t0, a);
+        let v = transported(d1, t1, b);
+        let w = transported(u, a, b);
+        let φ = atan2(dot(cross(w, v), b), dot(w, v));
+        let binormal = 2 / (1 + dot(a, b)) * cross(a, b);
+        next { t0 = a; t1 = b; d0 = unit(u); d1 = unit(v); }
+        (B * (norm_squared(binormal) - l * κ * dot(binormal, u + v) + (l * κ)^2) + C * (φ - l * τ)^2) / (2 * l)
+    }
 }

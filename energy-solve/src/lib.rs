@@ -94,6 +94,6 @@ pub use system::{EvaluationError, LinearisationOptions, LinearisedForces, System
 pub use terms::{
     Character, Counts, Curvature, DissipationLaw, DissipationTerm, Divisible, DrivenLaw, DrivenTerm, ElementList,
     ForceTerm, Linearisation, ListError, Order, OwnLaw, OwnResults, OwnTerm, PlacedTerm, PotentialTerm, Quantity,
-    Restriction, ScatterMaps, Share, State, SteeredTapeTerm, SteeredTapes, Stencils, StepStart, Tally, TapeTerm, Term,
-    TermDescription, TriangleBuffer, Weights, change_dense,
+    Restriction, ScatterMaps, Share, State, StatefulLaw, SteeredTapeTerm, SteeredTapes, Stencils, StepStart, Tally,
+    TapeTerm, Term, TermDescription, TriangleBuffer, Weights, change_dense,
 };

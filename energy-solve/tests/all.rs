@@ -10,6 +10,7 @@ mod elements;
 mod export;
 mod hinges;
 mod least_squares;
+mod memory;
 mod mixed;
 mod multigrid;
 mod solvers;

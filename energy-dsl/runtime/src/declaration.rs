@@ -62,6 +62,8 @@ pub enum FieldKind {
     /// A rotation, a unit quaternion w, x, y, z. As an unknown q, it moves by a rotation vector δ: q ← exp(δ) q, which
     /// turns by |δ| about δ.
     Rotation,
+    /// A parameter that integrators set to the length of the time step.
+    TimeStep,
 }
 
 /// A named input.
@@ -85,7 +87,7 @@ impl Field {
     pub const fn increments(&self) -> usize {
         match self.kind {
             FieldKind::Rotation => 3,
-            FieldKind::Numbers | FieldKind::Point => self.size,
+            FieldKind::Numbers | FieldKind::Point | FieldKind::TimeStep => self.size,
         }
     }
 }

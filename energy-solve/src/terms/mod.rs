@@ -23,7 +23,8 @@ pub use force_term::ForceTerm;
 pub use linearisation::{Linearisation, Weights};
 pub use own_term::{Order, OwnLaw, OwnResults, OwnTerm};
 pub use potential::{
-    DissipationLaw, DissipationTerm, DrivenLaw, DrivenTerm, PotentialTerm, SteeredTapeTerm, SteeredTapes, TapeTerm,
+    DissipationLaw, DissipationTerm, DrivenLaw, DrivenTerm, PotentialTerm, StatefulLaw, SteeredTapeTerm, SteeredTapes,
+    TapeTerm,
 };
 pub use restriction::Restriction;
 pub use scatter::TriangleBuffer;

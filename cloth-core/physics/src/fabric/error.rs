@@ -49,6 +49,20 @@ pub enum FabricError {
     /// The bending model has no rest angles that could flow.
     #[error("plasticity.curvature: this bending model cannot yield; expected `plate` or `bridson`")]
     CannotFold,
+    /// Segments are too long for a curl.
+    #[error("curl: a segment would turn by {turn:.0}°, at most 90° are possible; give at least {least} segments")]
+    CurlTooTight {
+        /// The turn of a segment, in degrees.
+        turn: f64,
+        /// Segments that would do.
+        least: f64,
+    },
+    /// The axis of a curl is along the strand.
+    #[error("curl.axis: {axis:?} is along the strand; give an axis across it")]
+    CurlAxis {
+        /// The axis given.
+        axis: [f64; 3],
+    },
     /// Elements and stencils do not match.
     #[error(transparent)]
     List(#[from] ListError),

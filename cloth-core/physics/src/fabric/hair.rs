@@ -1,11 +1,14 @@
+use std::f64::consts::FRAC_PI_2;
+
 use energy_dsl::Vector3;
 use energy_elements::{HairBend, HookeSpring};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
+use super::curled_hair::{Curled, CurledStrands};
 use super::{FabricError, FabricTerms, Surroundings, SystemPart};
-use crate::bounded::{Count, Direction, MaybeReals, NonNegative, Number, Positive, Real, Reals};
-use crate::geometry::norm;
+use crate::bounded::{Count, Direction, MaybeReal, MaybeReals, NonNegative, Number, Positive, Real, Reals};
+use crate::geometry::{dot, norm};
 
 /// Strands of hair, straight at rest: springs along the segments, bending at the vertices between them.
 #[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
@@ -41,9 +44,33 @@ pub struct Hair {
     /// Bending moment over curvature, in N m²: Young's modulus times the second moment of area of the cross-section.
     #[serde(with = "Real::<NonNegative>")]
     pub bend_stiffness: f64,
+    /// Natural curl, and resistance to twist. Default none: strands are straight at rest, and twist freely.
+    #[serde(default)]
+    pub curl: Option<Curl>,
     /// Whether the roots keep their position and direction. Default true.
     #[serde(default = "yes")]
     pub rooted: bool,
+}
+
+/// The natural shape of a strand without loads: a helix, or a circle without torsion. Strands start straight and curl.
+#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Curl {
+    /// Curvature, in 1/m: of a circle, one over its radius.
+    #[serde(with = "Real::<NonNegative>")]
+    pub curvature: f64,
+    /// Torsion, in 1/m. A helix of radius r and rise h per radian has the curvature r/(r² + h²) and the torsion
+    /// h/(r² + h²). Default 0.
+    #[serde(default, with = "Real::<Number>")]
+    pub torsion: f64,
+    /// Twisting moment over twist per length, in N m². Default two thirds of `bend_stiffness`, as for a round, incompressible
+    /// strand.
+    #[serde(default, with = "MaybeReal::<NonNegative>")]
+    pub twist_stiffness: Option<f64>,
+    /// The axis about which the root curls; its part along the strand does not count. Default [1, 0, 0], or [0, 1, 0] for
+    /// strands along it.
+    #[serde(default, with = "MaybeReals::<Number, 3>")]
+    pub axis: Option<[f64; 3]>,
 }
 
 fn down() -> [f64; 3] {
@@ -105,11 +132,45 @@ pub fn hair_terms(hair: &Hair, surroundings: &Surroundings, part: SystemPart) ->
     let length = hair.length / hair.segments as f64;
     let springs = vec![HookeSpring::new(hair.stretch_stiffness / length, length); segments.len()];
     terms.add_potential("hair stretch", &segments, springs)?;
-    if !terms.leave_out("hair bending", hair.bend_stiffness == 0.0, bends.len()) {
+    if let Some(curl) = &hair.curl {
+        let strands = curled(hair, curl)?;
+        if !terms.leave_out("hair curl", hair.bend_stiffness == 0.0, bends.len()) {
+            terms.add_driven("hair curl", &bends, strands);
+        }
+    } else if !terms.leave_out("hair bending", hair.bend_stiffness == 0.0, bends.len()) {
         // k/2 (1 − cos φ) ≈ k φ²/4 must equal the energy of a rod over one segment, B φ²/(2 l).
         let bending = vec![HairBend::new(2.0 * hair.bend_stiffness / length); bends.len()];
         terms.add_potential("hair bending", &bends, bending)?;
     }
     terms.add_surroundings(surroundings)?;
     Ok(terms)
+}
+
+/// Returns the bending and twist of strands with a natural curl.
+fn curled(hair: &Hair, curl: &Curl) -> Result<CurledStrands, FabricError> {
+    let length = hair.length / hair.segments as f64;
+    // Beyond a quarter of a turn between two segments, twist is not told from the other way round.
+    let turn = length * curl.curvature.hypot(curl.torsion);
+    if turn > FRAC_PI_2 {
+        let least = (hair.length * curl.curvature.hypot(curl.torsion) / FRAC_PI_2).ceil();
+        return Err(FabricError::CurlTooTight { turn: turn.to_degrees(), least });
+    }
+    let along = hair.direction.map(|component| component / norm(hair.direction));
+    let across = |axis: Vector3<f64>| {
+        let part = dot(axis, along);
+        let across: Vector3<f64> = std::array::from_fn(|i| axis[i] - part * along[i]);
+        (norm(across) > 1e-6 * norm(axis)).then(|| across.map(|component| component / norm(across)))
+    };
+    let axis = match curl.axis {
+        Some(axis) => across(axis).ok_or(FabricError::CurlAxis { axis })?,
+        None => across([1.0, 0.0, 0.0]).or_else(|| across([0.0, 1.0, 0.0])).expect("one of them is across"),
+    };
+    let numbers = Curled {
+        bend: hair.bend_stiffness,
+        twist: curl.twist_stiffness.unwrap_or(2.0 / 3.0 * hair.bend_stiffness),
+        length,
+        curvature: curl.curvature,
+        torsion: curl.torsion,
+    };
+    Ok(CurledStrands::new(numbers, hair.count, hair.segments - 1, [along, axis], hair.rooted))
 }

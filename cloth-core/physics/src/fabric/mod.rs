@@ -1,5 +1,6 @@
 //! Fabrics: which declared elements act on which vertices of a mesh, and with what parameters.
 
+mod curled_hair;
 mod damping;
 mod declared;
 mod description;
@@ -23,7 +24,7 @@ pub use description::{
     StrainLimit, Woven,
 };
 pub use error::FabricError;
-pub use hair::{Hair, hair_terms};
+pub use hair::{Curl, Hair, hair_terms};
 pub use library::{LIBRARY, LibraryFabric, UnknownFabric, in_library};
 pub use locking::Locking;
 pub use plate::{PlateTerm, Rigidity};

@@ -322,9 +322,13 @@ impl<'a> Checker<'a> {
     }
 
     fn input(&mut self, name: &Name, source: Source, first: usize, shape: Shape) -> Option<Typed> {
-        if self.in_rest && source == Source::Parameter && self.signature.is_state(first) {
-            let message = format!("`{}` changes from step to step, so the `rest` block cannot use it", name.text);
-            let help = "the rest block is computed once, from the rest shape and parameters";
+        let changes = self.signature.is_state(first) || self.signature.is_time_step(first);
+        if self.in_rest && source == Source::Parameter && changes {
+            let message = format!(
+                "`{}` changes from step to step, so neither the `rest` block nor a state at rest can use it",
+                name.text
+            );
+            let help = "they are computed once, from the rest shape and parameters";
             self.diagnostics.push(Diagnostic::new(&name.span, message).help(help));
             return None;
         }

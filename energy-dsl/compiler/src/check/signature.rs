@@ -67,6 +67,7 @@ impl Signature {
         }
         signature.states = signature.parameters.len() - own;
         signature.assign_velocities(velocities, diagnostics);
+        signature.mark_time_step(declaration, diagnostics);
         let numbers = |list: &[Input]| list.iter().map(|i| i.input_type.size()).sum::<usize>();
         if [&signature.moving, &signature.rest, &signature.parameters]
             .into_iter()
@@ -160,6 +161,35 @@ impl Signature {
         }
     }
 
+    /// Marks the parameter that `#[time_step(…)]` names.
+    fn mark_time_step(&mut self, declaration: &Declaration, diagnostics: &mut Diagnostics) {
+        let Some(name) = &declaration.time_step else { return };
+        let own = self.parameters.len() - self.states;
+        let canonical = name.canonical();
+        let is_scalar = |input: &Input| input.input_type == InputType { element: ElementType::Scalar, length: None };
+        let found = self.names.iter().find(|input| input.canonical == canonical && input.source == Source::Parameter);
+        let parameter =
+            found.and_then(|found| self.parameters[..own].iter_mut().find(|input| input.first == found.first));
+        match parameter.filter(|input| is_scalar(input)) {
+            Some(_) if self.states == 0 => {
+                let message = format!("{} has a time step and no state", declaration.name.text);
+                let help = "what depends on a step remembers its start: declare a state, or remove #[time_step]";
+                diagnostics.push(Diagnostic::new(&name.span, message).help(help));
+            }
+            Some(parameter) => parameter.is_time_step = true,
+            None => {
+                let message = format!("`{}` is not a scalar parameter of {}", name.text, declaration.name.text);
+                let help = format!("declare it after a `;`, as in {}: Scalar[s]", name.text);
+                diagnostics.push(Diagnostic::new(&name.span, message).help(help));
+            }
+        }
+    }
+
+    /// Returns whether the parameter that begins with this number is the time step.
+    pub(super) fn is_time_step(&self, first: usize) -> bool {
+        self.parameters.iter().any(|input| input.first == first && input.is_time_step)
+    }
+
     /// Adds the stiffness and the damping of a constraint. The formula cannot use them, so they have no names there.
     fn add_implied(&mut self, declaration: &Declaration) {
         for implied in ["stiffness", "damping"] {
@@ -171,6 +201,7 @@ impl Signature {
                 span: declaration.name.span.clone(),
                 first,
                 shared: false,
+                is_time_step: false,
             });
         }
     }
@@ -218,7 +249,7 @@ impl Signature {
             // The stub of a broken declaration must be valid Rust.
             let suffix = if stored && reserved(&name.text).is_some() { "_" } else { "" };
             let (name, unit, shared) = (format!("{}{suffix}", name.text), unit.text.clone(), *shared);
-            let input = Input { name, input_type, unit, span, first, shared };
+            let input = Input { name, input_type, unit, span, first, shared, is_time_step: false };
             if section == Section::Moving {
                 // Moving inputs are listed entry by entry, and motions part by part.
                 let entries: Vec<Input> = match length {

@@ -165,6 +165,8 @@ pub struct Input {
     pub first: usize,
     /// Whether it is one unknown for all elements.
     pub shared: bool,
+    /// Whether it is the parameter that integrators set to the time step.
+    pub is_time_step: bool,
 }
 
 /// An intermediate value.

@@ -133,6 +133,14 @@ fn memory(emitter: &Emitter<'_>) -> TokenStream {
     let fields: Vec<TokenStream> =
         (own..own + size).map(|number| component(&program.parameters, number, &quote!(self.))).collect();
     let numbers = 0..size;
+    let time_step = program.parameters.iter().find(|input| input.is_time_step).map(|input| {
+        let field = component(&program.parameters, input.first, &quote!(self.));
+        quote! {
+            fn set_time_step(&mut self, h: T) {
+                #field = h;
+            }
+        }
+    });
     let types = quote! {
         type Unknowns = #unknowns;
         type State = #state;
@@ -146,6 +154,8 @@ fn memory(emitter: &Emitter<'_>) -> TokenStream {
         fn set_state(&mut self, state: &#state) {
             #(#fields = state[#numbers];)*
         }
+
+        #time_step
     };
     let next = implementation(emitter, "Stateful", &types, &[RoutineKind::Next, RoutineKind::NextJacobians]);
     let sensitivity = plan.find(RoutineKind::StateJacobian).map(|routine| {

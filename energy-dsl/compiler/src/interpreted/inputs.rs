@@ -127,22 +127,42 @@ impl Interpreted {
         rest: &[Column<'_, S>],
         parameters: &[Column<'_, S>],
     ) -> Result<Elements<S>, BindError> {
-        let rest = self.columns(InputKind::Rest, count, rest)?;
-        let parameters = self.columns(InputKind::Parameter, count, parameters)?;
+        let rest = self.columns(InputKind::Rest, 0, count, rest)?;
+        let parameters = self.columns(InputKind::Parameter, 0, count, parameters)?;
         let elements = TapeElements::new(Arc::clone(&self.routines), count, &rest, &parameters)
             .map_err(|(index, error)| BindError::Rest { index, error })?;
         Ok(Elements::new(self.clone(), elements))
     }
 
-    /// Returns the columns with the sizes of their inputs.
+    /// Returns the states at rest of `count` elements, one element after the other, from columns as
+    /// [`Interpreted::elements`] takes them, but for the state. `None` if the declaration has no values at rest.
+    ///
+    /// # Errors
+    /// When columns are missing or have another length, or a state has no value.
+    pub fn states_at_rest<S: Float>(
+        &self,
+        count: usize,
+        rest: &[Column<'_, S>],
+        parameters: &[Column<'_, S>],
+    ) -> Result<Option<Vec<S>>, BindError> {
+        let rest = self.columns(InputKind::Rest, 0, count, rest)?;
+        let states = self.plan.declaration.state.len();
+        let parameters = self.columns(InputKind::Parameter, states, count, parameters)?;
+        TapeElements::states_at_rest(&self.routines, count, &rest, &parameters)
+            .map_err(|(index, error)| BindError::Rest { index, error })
+    }
+
+    /// Returns the columns with the sizes of their inputs, but for the last ones.
     fn columns<'a, S: Float>(
         &self,
         kind: InputKind,
+        without: usize,
         count: usize,
         given: &[Column<'a, S>],
     ) -> Result<Vec<(Column<'a, S>, usize)>, BindError> {
         let element = || self.plan.declaration.name.to_string();
-        let inputs: Vec<&InputNumbers> = self.inputs.iter().filter(|input| input.kind == kind).collect();
+        let mut inputs: Vec<&InputNumbers> = self.inputs.iter().filter(|input| input.kind == kind).collect();
+        inputs.truncate(inputs.len() - without);
         if inputs.len() != given.len() {
             let needed = inputs.iter().map(|input| input.name.clone()).collect();
             return Err(BindError::Columns {

@@ -5,7 +5,7 @@ use std::borrow::Cow;
 use crate::check::{Input, Program};
 use crate::graph::NodeId;
 use crate::routines::Routines;
-use energy_runtime::{Declaration, Field, Kind, Routine, RoutineKind};
+use energy_runtime::{Declaration, Field, FieldKind, Kind, Routine, RoutineKind};
 
 /// Returns the self-description of an element. It owns its texts and lists.
 pub(super) fn description(program: &Program, routines: &Routines) -> Declaration {
@@ -47,7 +47,7 @@ pub(super) fn description(program: &Program, routines: &Routines) -> Declaration
 fn fields(inputs: &[Input]) -> Cow<'static, [Field]> {
     let field = |input: &Input| Field {
         name: Cow::Owned(input.name.clone()),
-        kind: input.input_type.element.field_kind(),
+        kind: if input.is_time_step { FieldKind::TimeStep } else { input.input_type.element.field_kind() },
         shared: input.shared,
         size: input.input_type.size(),
         unit: Cow::Owned(input.unit.clone()),

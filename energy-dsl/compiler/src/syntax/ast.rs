@@ -76,6 +76,8 @@ pub struct Declaration {
     pub uncompensated: bool,
     /// Whether the declaration has the attribute `#[vertex]`.
     pub vertices: bool,
+    /// The parameter that `#[time_step(…)]` names; `None` without it.
+    pub time_step: Option<Name>,
     /// Limits of `#[limits(…)]`; `None` without it.
     pub limits: Option<Limits>,
     /// Kind of the declaration.

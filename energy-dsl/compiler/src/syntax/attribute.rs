@@ -1,6 +1,7 @@
 //! Attributes of declarations: documentation, audit, claimed properties and accuracy.
 
 use super::ast::{AuditRange, AuditScope};
+use super::name::Name;
 use super::parse::{Parsed, Parser};
 use super::tokens::{Kind as TokenKind, Token};
 use crate::budget::Limits;
@@ -17,11 +18,13 @@ pub(super) struct Attributes {
     pub(super) uncompensated: bool,
     pub(super) vertices: bool,
     pub(super) limits: Option<Limits>,
+    pub(super) time_step: Option<Name>,
 }
 
 impl Parser<'_> {
     /// Parses an attribute after its `#`: `[doc = "…"]`, `[audit]`, `[audit(samples = n, …)]`, `[invariant(translation,
-    /// rotation)]`, `[rest_state(zero_force)]`, `[even]`, `[uncompensated]`, `[vertex]` or `[limits(steps = n, bytes = n)]`.
+    /// rotation)]`, `[rest_state(zero_force)]`, `[even]`, `[uncompensated]`, `[vertex]`, `[time_step(h)]` or `[limits(steps = n,
+    /// bytes = n)]`.
     pub(super) fn attribute(&mut self, attributes: &mut Attributes) -> Parsed<()> {
         if self.fault().is_none() && !self.is("[") {
             let comment =
@@ -49,12 +52,17 @@ impl Parser<'_> {
             "even" => attributes.properties.push((Property::Even, name.span)),
             "uncompensated" => attributes.uncompensated = true,
             "vertex" => attributes.vertices = true,
+            "time_step" => {
+                self.expect("(", "and the parameter that is the time step, as in #[time_step(h)]")?;
+                attributes.time_step = Some(self.name("the parameter that is the time step")?);
+                self.expect(")", "after the name of the time step")?;
+            }
             "limits" => attributes.limits = Some(self.limits()?),
             other => {
                 return Err(Box::new(Diagnostic::new(&name.span, format!("unknown attribute `{other}`")).help(
                     "a declaration takes doc comments, #[audit], #[audit(samples = 200)], \
                      #[audit(domain(k = 1..10), tolerance = 1e-6)], #[invariant(translation, rotation)], \
-                     #[rest_state(zero_force)], #[even], #[uncompensated], #[vertex] and \
+                     #[rest_state(zero_force)], #[even], #[uncompensated], #[vertex], #[time_step(h)] and \
                      #[limits(steps = 1e9, bytes = 2e9)]",
                 )));
             }

@@ -240,11 +240,14 @@ impl<'a> Parser<'a> {
         while self.take("#") {
             self.attribute(&mut attributes)?;
         }
-        let Attributes { docs, audit_samples, audit_scope, properties, uncompensated, vertices, limits } = attributes;
+        let Attributes { docs, audit_samples, audit_scope, properties, uncompensated, vertices, limits, time_step } =
+            attributes;
         let uncompensated_prefix = if uncompensated { "#[uncompensated] " } else { "" };
         let limits_prefix = limits.map_or_else(String::new, |limits| format!("{} ", limits.attribute()));
         let vertex_prefix = if vertices { "#[vertex] " } else { "" };
-        let prefix = &format!("{}{uncompensated_prefix}{vertex_prefix}{limits_prefix}", audit_scope.attribute());
+        let step_prefix = time_step.as_ref().map_or_else(String::new, |h| format!("#[time_step({})] ", h.text));
+        let prefix =
+            &format!("{}{uncompensated_prefix}{vertex_prefix}{step_prefix}{limits_prefix}", audit_scope.attribute());
         let visibility_start = self.at;
         if self.take_word("pub") && self.take("(") {
             while !self.take(")") {
@@ -255,7 +258,12 @@ impl<'a> Parser<'a> {
             }
         }
         let visibility = tokens::text(&self.tokens[visibility_start..self.at]);
-        let claims = audit_samples.is_some() || uncompensated || vertices || limits.is_some() || !properties.is_empty();
+        let claims = audit_samples.is_some()
+            || uncompensated
+            || vertices
+            || limits.is_some()
+            || time_step.is_some()
+            || !properties.is_empty();
         if claims && (self.is_word("fn") || self.is_word("const")) {
             return self.fail("a declaration after its attributes (functions and constants have only documentation)");
         }
@@ -281,6 +289,7 @@ impl<'a> Parser<'a> {
                 properties,
                 uncompensated,
                 vertices,
+                time_step,
                 limits,
                 kind,
                 name,
@@ -314,6 +323,7 @@ impl<'a> Parser<'a> {
             properties,
             uncompensated,
             vertices,
+            time_step,
             limits,
             kind,
             name,

@@ -110,6 +110,7 @@ fn specialised(
     let source = format!("{} {}", declaration.source, original.source);
     let uncompensated = declaration.uncompensated || original.uncompensated;
     let vertices = declaration.vertices || original.vertices;
+    let time_step = declaration.time_step.clone().or_else(|| original.time_step.clone());
     let (limits, formula) = (declaration.limits.or(original.limits), original.formula.clone());
-    Some(Declaration { docs, inputs, body, uncompensated, vertices, limits, formula, source, ..declaration })
+    Some(Declaration { docs, inputs, body, uncompensated, vertices, time_step, limits, formula, source, ..declaration })
 }

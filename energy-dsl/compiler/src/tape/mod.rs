@@ -25,6 +25,7 @@ pub(crate) fn tapes(plan: &Plan) -> Result<Routines, TooLarge> {
         parameters: plan.parameters,
         shape: plan.shape,
         rest: routine_tape(&plan.rest, Vec::new())?,
+        at_rest: plan.at_rest.as_ref().map(state_at_rest).transpose()?,
         list,
         expansion,
         repetition: plan.repetition.clone(),
@@ -76,6 +77,13 @@ fn general_tape(general: &GeneralPlan, guard: u16, inputs: &[Input]) -> Result<G
         outside: outside.and_then(|Recorded { tape, guard, .. }| Some((tape, guard?))),
         summed: general.summed,
     })
+}
+
+/// Writes the state at rest to a tape.
+fn state_at_rest(code: &Code) -> Result<Routine, TooLarge> {
+    let inputs = code.inputs();
+    let Recorded { tape, groups, .. } = record(code, &inputs)?;
+    Ok(Routine { kind: RoutineKind::Rest, inputs, tape, groups, flags: [None, None], general: None })
 }
 
 /// Writes the expansion to points. Its inputs are all `results` of the reduced Hessian, the value first.

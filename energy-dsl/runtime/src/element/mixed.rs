@@ -129,6 +129,8 @@ pub trait Stateful<T: Real>: Element {
     fn state(&self) -> Self::State;
     /// Replaces the state.
     fn set_state(&mut self, state: &Self::State);
+    /// Sets the parameter that `#[time_step(…)]` names to the length of the next step; elements without one ignore it.
+    fn set_time_step(&mut self, _h: T) {}
     /// Returns the state after a step that ends at u.
     fn next(&self, u: &Self::Unknowns) -> NextState<T, Self::State>;
     /// [`Self::next`] for callers that run at SIMD level `L`.

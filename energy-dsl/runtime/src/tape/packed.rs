@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::TAPE_BLOCK;
 use super::lanes::Slot;
-use super::routine::{Input, Routines};
+use super::routine::{Input, Routine, Routines};
 use super::runner::Spare;
 use super::slots::Slots;
 use crate::aligned::Aligned;
@@ -33,6 +33,8 @@ pub struct TapeElements<S = f64> {
 /// Numbers of elements. Those that all elements share are held once.
 #[derive(Clone, Debug)]
 pub(super) struct Numbers<S> {
+    /// Number of elements.
+    count: usize,
     sources: Vec<Source<S>>,
     /// Numbers that differ between elements.
     columns: usize,
@@ -71,7 +73,7 @@ impl<S: Float> Numbers<S> {
                 *stored = numbers[(block * TAPE_BLOCK + element).min(count - 1) * size + number];
             }
         }
-        Self { sources, columns: each.len(), blocks: stored }
+        Self { count, sources, columns: each.len(), blocks: stored }
     }
 
     /// Returns the number that all elements share; `None` if it differs.
@@ -80,6 +82,41 @@ impl<S: Float> Numbers<S> {
             Source::Same(value) => Some(value),
             Source::Each(_) => None,
         }
+    }
+
+    /// Replaces a number by one that all elements share.
+    fn share(&mut self, number: usize, value: S) {
+        match self.sources[number] {
+            Source::Same(_) => self.sources[number] = Source::Same(value),
+            Source::Each(_) => self.set_each(number, |_| value),
+        }
+    }
+
+    /// Replaces a number by a function of the elements. It gets a column if all elements shared it.
+    fn set_each(&mut self, number: usize, value: impl Fn(usize) -> S) {
+        let column = match self.sources[number] {
+            Source::Each(column) => column,
+            Source::Same(_) => self.add_column(),
+        };
+        self.sources[number] = Source::Each(column);
+        let slots = self.blocks.as_chunks_mut::<TAPE_BLOCK>().0.iter_mut();
+        for (block, slot) in slots.skip(column).step_by(self.columns).enumerate() {
+            slot.iter_mut().enumerate().for_each(|(at, stored)| *stored = value(block * TAPE_BLOCK + at));
+        }
+    }
+
+    /// Adds a column of zeros, and returns its index.
+    fn add_column(&mut self) -> usize {
+        let (old, count) = (self.columns, self.count.div_ceil(TAPE_BLOCK));
+        let mut blocks = Aligned::new(count * (old + 1) * TAPE_BLOCK, S::from_f64(0.0));
+        for (place, slot) in blocks.as_chunks_mut::<TAPE_BLOCK>().0.iter_mut().enumerate() {
+            let (block, column) = (place / (old + 1), place % (old + 1));
+            if column < old {
+                *slot = self.blocks.as_chunks::<TAPE_BLOCK>().0[block * old + column];
+            }
+        }
+        (self.blocks, self.columns) = (blocks, old + 1);
+        old
     }
 
     /// Returns a number of an element.
@@ -120,11 +157,56 @@ impl<S: Float> TapeElements<S> {
         let total = |columns: &[(Column<'_, S>, usize)]| columns.iter().map(|(_, size)| size).sum::<usize>();
         assert_eq!(total(rest), routines.shape, "{}: the columns of the rest shape", routines.name);
         assert_eq!(total(parameters), routines.parameters, "{}: the columns of parameters", routines.name);
-        let stored = Stored::of(&routines, count, rest, parameters)?;
+        let stored = Stored::of(&routines, &routines.rest, count, rest, parameters)?;
         let mut columns = parameters.to_vec();
         columns.push((stored.column(), routines.rest.groups[0].len()));
         let numbers = Numbers::new(count, &columns);
         Ok(Self { routines, count, numbers, spare: Spare::default() })
+    }
+
+    /// Returns the states at rest of `count` elements, one element after the other, from their rest shapes and their
+    /// parameters without the state, each a list of columns with their sizes. `None` if the declaration gives none.
+    ///
+    /// # Errors
+    /// Returns the index of the first element whose state has no value.
+    ///
+    /// # Panics
+    /// When the columns do not have the declared sizes.
+    pub fn states_at_rest(
+        routines: &Routines,
+        count: usize,
+        rest: &[(Column<'_, S>, usize)],
+        parameters: &[(Column<'_, S>, usize)],
+    ) -> Result<Option<Vec<S>>, (usize, RestError)> {
+        let Some(routine) = &routines.at_rest else { return Ok(None) };
+        Ok(Some(match Stored::of(routines, routine, count, rest, parameters)? {
+            Stored::Same(state) => state.repeat(count),
+            Stored::Each(states) => states,
+        }))
+    }
+
+    /// Replaces consecutive numbers of the parameters, from `first` on.
+    ///
+    /// # Panics
+    /// When the column does not have `size` numbers, of each element or of all, or the parameters end before.
+    pub fn set_parameters(&mut self, first: usize, size: usize, column: Column<'_, S>) {
+        let (of_one, count) = match column {
+            Column::Same(numbers) => (numbers, 1),
+            Column::Each(numbers) => (numbers, self.count),
+        };
+        assert_eq!(of_one.len(), count * size, "{}: a column of parameters", self.routines.name);
+        assert!(first + size <= self.routines.parameters, "{}: numbers of the parameters", self.routines.name);
+        for number in 0..size {
+            match column {
+                Column::Same(numbers) => self.numbers.share(first + number, numbers[number]),
+                Column::Each(numbers) => {
+                    let last = self.count.saturating_sub(1);
+                    self.numbers.set_each(first + number, |element| numbers[element.min(last) * size + number]);
+                }
+            }
+        }
+        // Slots know which numbers are shared.
+        self.spare = Spare::default();
     }
 
     /// Returns the number of elements.
@@ -166,7 +248,7 @@ impl<S: Float> TapeElements<S> {
                 *number = old[index / TAPE_BLOCK * columns + column][index % TAPE_BLOCK];
             }
         }
-        let numbers = Numbers { sources: self.numbers.sources.clone(), columns, blocks: stored };
+        let numbers = Numbers { count: indices.len(), sources: self.numbers.sources.clone(), columns, blocks: stored };
         Self { routines: Arc::clone(&self.routines), count: indices.len(), numbers, spare: Spare::default() }
     }
 
@@ -191,14 +273,15 @@ impl<S: Float> Stored<S> {
         }
     }
 
-    /// Runs the `rest` block of all elements; of one, if they all share its inputs.
+    /// Runs the `rest` block of all elements, or what else is computed once; of one, if they all share its inputs.
     fn of(
         routines: &Routines,
+        routine: &Routine,
         count: usize,
         rest: &[(Column<'_, S>, usize)],
         parameters: &[(Column<'_, S>, usize)],
     ) -> Result<Self, (usize, RestError)> {
-        let (routine, size) = (&routines.rest, routines.rest.groups[0].len());
+        let size = routine.groups[0].len();
         let inputs = Numbers::new(count, &[rest, parameters].concat());
         let place = |input: &Input| match *input {
             Input::Rest(number) => usize::from(number),

@@ -196,6 +196,8 @@ pub struct Routines {
     pub shape: usize,
     /// The `rest` block: its results are the stored numbers; where its first flag is set, the shape is degenerate.
     pub rest: Routine,
+    /// The state at rest, from the rest shape and the parameters; `None` if it is given with each element.
+    pub at_rest: Option<Routine>,
     /// The moving part, or one term of it.
     pub list: Vec<Routine>,
     /// Expands the results of the reduced Hessian, its inputs, to U, ∂U/∂x and the triangle of ∂²U/∂x².

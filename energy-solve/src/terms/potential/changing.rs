@@ -23,6 +23,10 @@ pub(super) trait Changing: TermDescription + Sync + 'static {
     fn pack(&mut self, time: f64, active: &Active, maps: &ScatterMaps) -> PlacedPotentialTerm<Self::Packs>;
     /// Whether elements differ between two times, in s, or from those that were packed.
     fn varies(&self, from: f64, to: f64) -> bool;
+    /// Takes the size of the next step, in s. Returns whether an element changed.
+    fn begin_step(&mut self, _dt: f64) -> bool {
+        false
+    }
     /// Advances the history at the end of a step. Returns whether an element changed.
     fn advance(&mut self, _x: &[Vector3<f64>]) -> bool {
         false
@@ -100,6 +104,7 @@ impl<T: Changing> PlacedTerm for PlacedChangingTerm<T> {
     /// Takes the elements at the end of the step.
     fn begin_step(&mut self, start: StepStart<'_>) {
         let end = start.time + start.dt;
+        self.is_stale |= self.term.begin_step(start.dt);
         if self.is_stale || self.term.varies(self.time, end) {
             self.renew(end);
         }

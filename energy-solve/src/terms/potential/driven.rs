@@ -24,6 +24,10 @@ pub trait DrivenLaw: Debug + Send + Sync {
     fn varies(&self, _from: f64, _to: f64) -> bool {
         false
     }
+    /// Takes the size of the next step, in s. Returns whether an element changed.
+    fn begin_step(&mut self, _dt: f64) -> bool {
+        false
+    }
     /// Advances the history at the end of a step. Returns whether an element changed.
     fn advance(&mut self, _stencils: Stencils<'_>, _x: &[Vector3<f64>]) -> bool {
         false
@@ -39,8 +43,8 @@ pub trait DrivenLaw: Debug + Send + Sync {
 /// The forces −∇U of potentials whose parameters are fixed during a step and change between steps.
 #[derive(Debug)]
 pub struct DrivenTerm<L> {
-    law: L,
-    on: NamedStencils,
+    pub(super) law: L,
+    pub(super) on: NamedStencils,
 }
 
 impl<L: DrivenLaw> DrivenTerm<L> {
@@ -79,6 +83,10 @@ impl<L: DrivenLaw + 'static> Changing for DrivenTerm<L> {
 
     fn varies(&self, from: f64, to: f64) -> bool {
         self.law.varies(from, to)
+    }
+
+    fn begin_step(&mut self, dt: f64) -> bool {
+        self.law.begin_step(dt)
     }
 
     fn advance(&mut self, x: &[Vector3<f64>]) -> bool {

@@ -7,6 +7,7 @@ mod evaluated;
 mod named_stencils;
 mod pack_energies;
 mod placed;
+mod stateful;
 mod steered;
 mod tapes;
 mod waiting;
@@ -18,15 +19,19 @@ use std::sync::Arc;
 use energy_dsl::tape::TapeElements;
 use energy_dsl::{Declaration, Packed, PackedPotential};
 
+use self::changing::PlacedChangingTerm;
 pub use self::dissipation::{DissipationLaw, DissipationTerm};
 pub use self::driven::{DrivenLaw, DrivenTerm};
 use self::placed::PlacedPotentialTerm;
+pub use self::stateful::StatefulLaw;
+use self::stateful::StatefulTapes;
 pub use self::steered::{SteeredTapeTerm, SteeredTapes};
 use self::tapes::TapePacks;
 use crate::matrix::dof_map::DofMap;
 use crate::matrix::pattern::{Pattern, index};
 use crate::terms::active::Active;
 use crate::terms::element_list::ElementList;
+use crate::terms::scatter_map::ScatterMaps;
 use crate::terms::stencils::Stencils;
 use crate::terms::term::{Character, PlacedTerm, Term, TermDescription};
 
@@ -80,7 +85,8 @@ impl<E: PackedPotential<f64> + Debug + Send + Sync + 'static> Term for Potential
 }
 
 /// A term with f = −∇U whose elements were read at run time. It does what [`PotentialTerm`] does, with the same bits;
-/// routines are interpreted, a block of elements at a time.
+/// routines are interpreted, a block of elements at a time. Elements with a state take their next one at the end of each
+/// step.
 #[derive(Clone, Debug)]
 pub struct TapeTerm {
     name: String,
@@ -107,6 +113,13 @@ impl TapeTerm {
         assert_eq!(vertices.len(), elements.len() * declaration.points.len(), "{name}: every element needs a stencil");
         Self { name, declaration: Arc::clone(declaration), elements, vertices }
     }
+
+    /// Returns the active elements, which write by `maps`.
+    fn packed(&self, active: &Active, maps: &ScatterMaps) -> PlacedPotentialTerm<TapePacks> {
+        let all = (self.elements.len(), self.vertices.clone());
+        let packed = TapePacks::of_active(&self.declaration, self.elements.clone(), self.stencils(), active);
+        PlacedPotentialTerm::with_maps(self.name.clone(), all, (active.clone(), packed), maps.clone())
+    }
 }
 
 impl TermDescription for TapeTerm {
@@ -129,6 +142,9 @@ impl TermDescription for TapeTerm {
 
 impl Term for TapeTerm {
     fn place(self: Box<Self>, dofs: &DofMap, pattern: &Pattern) -> Box<dyn PlacedTerm> {
+        if !self.declaration.state.is_empty() {
+            return Box::new(PlacedChangingTerm::new(StatefulTapes::new(*self), dofs, pattern));
+        }
         let stencils = self.stencils();
         let active = Active::new(stencils, dofs);
         let packed = TapePacks::of_active(&self.declaration, self.elements.clone(), stencils, &active);

@@ -12,8 +12,8 @@ use crate::terms::stencils::Stencils;
 #[derive(Debug)]
 pub(super) struct NamedStencils {
     pub name: String,
-    vertices: Vec<u32>,
-    arity: usize,
+    pub vertices: Vec<u32>,
+    pub arity: usize,
 }
 
 impl NamedStencils {

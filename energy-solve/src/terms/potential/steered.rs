@@ -118,12 +118,8 @@ impl Changing for SteeredTapeTerm {
     type Packs = TapePacks;
 
     fn pack(&mut self, _: f64, active: &Active, maps: &ScatterMaps) -> PlacedPotentialTerm<TapePacks> {
-        let (version, elements) = self.tapes.now();
-        self.packed = version;
-        let TapeTerm { name, declaration, vertices, .. } = &self.term;
-        let all = (elements.len(), vertices.clone());
-        let packed = TapePacks::of_active(declaration, elements, self.term.stencils(), active);
-        PlacedPotentialTerm::with_maps(name.clone(), all, (active.clone(), packed), maps.clone())
+        (self.packed, self.term.elements) = self.tapes.now();
+        self.term.packed(active, maps)
     }
 
     fn varies(&self, _: f64, _: f64) -> bool {

@@ -23,6 +23,9 @@ use crate::mesh::{MaterialTriangle, TriangleMesh};
 /// Parameters come from `parameters`. A parameter that is not given there has a default if its name is one of these:
 /// `L`, the rest length of an edge; `A`, the rest area of a triangle; `θ0`, the rest angle of a hinge; `m`, the mass of
 /// a vertex.
+///
+/// Elements may have memory: states with values at rest, which `next` advances after each step. The parameter that
+/// `#[time_step(h)]` names is the size of the step, in s.
 #[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Declared {

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use energy_compiler::{BindError, Interpreted, canonical_name};
 use energy_dsl::tape::Column;
-use energy_dsl::{Declaration, Field, Kind, Vector3};
+use energy_dsl::{Declaration, Field, FieldKind, Kind, Vector3};
 use energy_solve::TapeTerm;
 
 use super::{Declared, DeclaredError, TargetMesh};
@@ -21,6 +21,7 @@ impl Declared {
         let known: BTreeSet<String> = elements
             .iter()
             .flat_map(|element| &*element.declaration().parameters)
+            .filter(|parameter| parameter.kind != FieldKind::TimeStep)
             .map(|parameter| canonical_name(&parameter.name))
             .collect();
         if let Some(unused) = self.parameters.keys().find(|name| !known.contains(&canonical_name(name))) {
@@ -69,14 +70,23 @@ impl Declared {
         let inputs: Vec<(Vec<f64>, Vec<f64>)> = inputs.collect::<Result<_, _>>()?;
         let parameters = columns(&declaration.parameters, inputs.iter().map(|(parameters, _)| &parameters[..]));
         let rest = columns(&declaration.rest, inputs.iter().map(|(_, rest)| &rest[..]));
-        let [rest, parameters] =
-            [&rest, &parameters].map(|all| all.iter().map(|c| Column::Each(c)).collect::<Vec<_>>());
-        let elements = element.elements(sites.len(), &rest, &parameters).map_err(|error| match error {
+        let misfit = |error: BindError| match error {
             BindError::Rest { index, error: source } => {
                 DeclaredError::Rest { path: self.path.clone(), vertices: sites[index].vertices.clone(), source }
             }
             other => unfit(format!("an energy with other inputs than its declaration has ({other})")),
-        })?;
+        };
+        let states = element.states_at_rest(sites.len(), &each(&rest), &each(&parameters)).map_err(misfit)?;
+        if let Some(state) = declaration.state.first().filter(|_| states.is_none()) {
+            return Err(unfit(format!(
+                "an energy whose state `{0}` has no value at rest; a material needs one, as in `state {0}: Scalar = 0`",
+                state.name
+            )));
+        }
+        let size = declaration.state.iter().map(|field| field.size).sum::<usize>().max(1);
+        let states = columns(&declaration.state, states.as_deref().unwrap_or(&[]).chunks_exact(size));
+        let elements =
+            element.elements(sites.len(), &each(&rest), &each(&[parameters, states].concat())).map_err(misfit)?;
         let stencils = sites.iter().flat_map(|site| site.vertices.iter().map(|vertex| target.first + vertex));
         let name = format!("{}{}", target.prefix, declaration.name);
         Ok(TapeTerm::new(name, declaration, elements.tape().clone(), stencils))
@@ -93,6 +103,10 @@ impl Declared {
         let given: BTreeMap<String, f64> =
             self.parameters.iter().map(|(name, value)| (canonical_name(name), *value)).collect();
         let parameter = |field: &Field| {
+            if field.kind == FieldKind::TimeStep {
+                // The integrator sets it.
+                return Ok(1.0);
+            }
             let name = canonical_name(&field.name);
             let value = given.get(&name).copied().or_else(|| site.default_of(&name)).filter(|_| field.size == 1);
             value.ok_or_else(|| DeclaredError::Missing {
@@ -123,6 +137,11 @@ fn columns<'a>(fields: &[Field], elements: impl Iterator<Item = &'a [f64]> + Clo
         elements.clone().flat_map(|numbers| numbers[first - field.size..first].to_vec()).collect()
     };
     fields.iter().map(column).collect()
+}
+
+/// Binds the numbers of each element.
+fn each(columns: &[Vec<f64>]) -> Vec<Column<'_, f64>> {
+    columns.iter().map(|column| Column::Each(column)).collect()
 }
 
 /// The vertices that one element acts on.
