@@ -78,7 +78,8 @@ static list records(FILE *file, int32_t wanted) {
     rewind(file);
     while (fread(&number, sizeof number, 1, file) == 1) {
         const OF(element) *e = entries[number].element;
-        const size_t sizes[4] = {(size_t)e->rest, (size_t)e->parameters, (size_t)e->coordinates, (size_t)e->coordinates};
+        const size_t unknowns = (size_t)e->coordinates;
+        const size_t sizes[4] = {(size_t)e->rest, (size_t)e->parameters, unknowns, unknowns};
         const REAL *of_rest[2];
         REAL *own[5];
         for (k = 0; k < 4; k++) {
@@ -165,7 +166,8 @@ static OF(column) column(const REAL *from, int32_t size) {
     return of;
 }
 
-/* Inputs of all elements: numbers of their own with the state after the parameters, or gathered ones with the state apart. */
+/* Inputs of all elements: numbers of their own with the state after the parameters, or gathered ones with the state
+   apart. */
 static OF(mixed_batch) batch_of(const list *all, int is_gathered) {
     OF(mixed_batch) batch;
     memset(&batch, 0, sizeof batch);
@@ -196,8 +198,8 @@ static REAL entry_of(const list *all, const REAL *matrix, int is_triangle, int32
     return is_triangle ? matrix[i * n - i * (i - 1) / 2 + j - i] : matrix[row * n + column_];
 }
 
-/* Whether blocks of a matrix reach their slots: one block after the other, with a gap of one number, in an order of their
-   own. */
+/* Whether blocks of a matrix reach their slots: one block after the other, with a gap of one number, in an order of
+   their own. */
 static int blocks_are_placed(const list *all, int32_t routine, int32_t place, const REAL *returned, int way) {
     const int32_t n = all->layout.increments, unknowns = all->layout.unknowns, pairs = unknowns * unknowns;
     const int is_triangle = routine != ENERGY_JACOBIANS;

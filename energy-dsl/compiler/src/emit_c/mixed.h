@@ -1,4 +1,5 @@
-/* Kinds of unknowns. All unknowns of a kind are stored together, one after the other; a motion is a point and a rotation. */
+/* Kinds of unknowns. All unknowns of a kind are stored together, one after the other; a motion is a point and a
+   rotation. */
 #ifndef ENERGY_UNKNOWNS
 #define ENERGY_UNKNOWNS
 enum energy_kind {
@@ -8,7 +9,8 @@ enum energy_kind {
     ENERGY_VEC4,
     ENERGY_POINT2,
     ENERGY_POINT,
-    /* Four numbers, a unit quaternion w, x, y, z, which move by three increments: exp(increment) times the quaternion. */
+    /* Four numbers, a unit quaternion w, x, y, z, which move by three increments: exp(increment) times the
+       quaternion. */
     ENERGY_ROTATION,
     ENERGY_KINDS,
     /* Added to the kind of an unknown that all elements share. */
@@ -41,8 +43,8 @@ typedef struct {
 
 /* Elements to evaluate.
 
-   Unknowns are gathered by `unknowns` and `shared`. If `batch.x` has numbers, it has all unknowns of each element instead,
-   in declared order, and `batch.v` their velocities; `batch.stencils` and `batch.points` are not read.
+   Unknowns are gathered by `unknowns` and `shared`. If `batch.x` has numbers, it has all unknowns of each element
+   instead, in declared order, and `batch.v` their velocities; `batch.stencils` and `batch.points` are not read.
 
    Slots of results (ENERGY_ADDED, ENERGY_STORED) are places of numbers, not of blocks, as unknowns differ in size:
    - a gradient has a slot for each unknown, that of its first increment;
@@ -57,7 +59,8 @@ typedef struct {
     /* Numbers and velocities of the unknowns that all elements share, in declared order. */
     const @real *shared, *shared_velocities;
     /* The state of each element. If it has no numbers, the state follows the parameters in `batch.parameters`.
-       ENERGY_NEXT may write its result to the same array: each element reads its old state before it writes the new one. */
+       ENERGY_NEXT may write its result to the same array: each element reads its old state before it writes the new
+       one. */
     @column state;
 } @mixed_batch;
 
@@ -79,8 +82,8 @@ ENERGY_FN int32_t @kind_size(int32_t kind, int of_increments) {
 }
 
 /* Reads the unknowns of an element, or their velocities. */
-ENERGY_FN void @read_unknowns(const @layout *layout, const @mixed_batch *all, int of_increments, size_t element,
-                              @real *numbers) {
+ENERGY_ROUTINE void @read_unknowns(const @layout *layout, const @mixed_batch *all, int of_increments, size_t element,
+                                   @real *numbers) {
     const @column *own = of_increments ? &all->batch.v : &all->batch.x;
     const @real *shared = of_increments ? all->shared_velocities : all->shared;
     size_t counts[ENERGY_KINDS], read[ENERGY_KINDS];
@@ -117,8 +120,8 @@ ENERGY_FN void @read_unknowns(const @layout *layout, const @mixed_batch *all, in
 }
 
 /* Reads the parameters of an element, `count` with its state. */
-ENERGY_FN void @read_parameters(const @layout *layout, const @mixed_batch *all, size_t element, int32_t count,
-                                @real *numbers) {
+ENERGY_ROUTINE void @read_parameters(const @layout *layout, const @mixed_batch *all, size_t element, int32_t count,
+                                     @real *numbers) {
     const int is_apart = all->state.numbers != NULL;
     @read(&all->batch.parameters, element, is_apart ? count - layout->state : count, numbers);
     if (is_apart) {
@@ -179,8 +182,8 @@ ENERGY_FN enum energy_form @form_of(int32_t routine, int32_t place) {
 }
 
 /* Writes the blocks of a matrix to their slots. Returns the next slot. */
-ENERGY_FN const uint32_t *@put_blocks(const @layout *layout, const @result *to, int is_triangle, const uint32_t *slots,
-                                      const @real *numbers) {
+ENERGY_ROUTINE const uint32_t *@put_blocks(const @layout *layout, const @result *to, int is_triangle,
+                                           const uint32_t *slots, const @real *numbers) {
     int32_t a, b, row, column, first_row = 0;
     for (a = 0; a < layout->unknowns; a++) {
         const int32_t rows = @kind_size(layout->kinds[a], 1);
@@ -203,8 +206,8 @@ ENERGY_FN const uint32_t *@put_blocks(const @layout *layout, const @result *to, 
 }
 
 /* Writes rows of increments to their slots: one for each row and unknown. */
-ENERGY_FN void @put_rows(const @layout *layout, const @result *to, const uint32_t *slots, int32_t count,
-                         const @real *numbers) {
+ENERGY_ROUTINE void @put_rows(const @layout *layout, const @result *to, const uint32_t *slots, int32_t count,
+                              const @real *numbers) {
     int32_t number = 0, unknown = 0, j;
     while (number < count) {
         const int32_t size = @kind_size(layout->kinds[unknown], 1);
@@ -223,8 +226,8 @@ ENERGY_FN int32_t @triangle_size(const @layout *layout) {
 }
 
 /* Writes triangles as whole matrices, or as upper triangles of numbers. */
-ENERGY_FN void @write_triangles(const @layout *layout, const @result *to, size_t element, int32_t count,
-                                const @real *numbers) {
+ENERGY_ROUTINE void @write_triangles(const @layout *layout, const @result *to, size_t element, int32_t count,
+                                     const @real *numbers) {
     const int32_t size = @triangle_size(layout);
     int32_t first, row, column, j = 0;
     for (first = 0; first < count; first += size) {
@@ -239,8 +242,8 @@ ENERGY_FN void @write_triangles(const @layout *layout, const @result *to, size_t
 }
 
 /* Writes or adds a result of an element. */
-ENERGY_FN void @mixed_write(const @layout *layout, const @result *to, int32_t routine, int32_t place, size_t element,
-                            int32_t count, const @real *numbers) {
+ENERGY_ROUTINE void @mixed_write(const @layout *layout, const @result *to, int32_t routine, int32_t place,
+                                 size_t element, int32_t count, const @real *numbers) {
     const enum energy_form form = @form_of(routine, place);
     int32_t j;
     if (to->numbers == NULL) {
@@ -276,8 +279,8 @@ ENERGY_FN int @reads_velocities(int32_t routine) {
 }
 
 /* Reads all inputs of an element: unknowns or rest shape, velocities, parameters with the state, stored numbers. */
-ENERGY_FN void @read_all(const @element *element, const @layout *layout, const @mixed_batch *all, int32_t routine,
-                         size_t i, @real *work) {
+ENERGY_ROUTINE void @read_all(const @element *element, const @layout *layout, const @mixed_batch *all, int32_t routine,
+                              size_t i, @real *work) {
     @real *v = work + @moving(element), *parameters = v + element->coordinates;
     if (routine == ENERGY_REST) {
         @read(&all->batch.x, i, element->rest, work);
@@ -293,10 +296,10 @@ ENERGY_FN void @read_all(const @element *element, const @layout *layout, const @
     @read(&all->batch.stored, i, element->stored, parameters + element->parameters);
 }
 
-/* Runs a routine of an element on many elements, in order. For ENERGY_REST, `batch.x` is the rest shape. `work` has room
-   for all inputs and results of one. */
-ENERGY_FN void @mixed_run_each(const @element *element, const @layout *layout, int32_t routine, @mixed_batch *all,
-                               size_t first, size_t count, @real *work) {
+/* Runs a routine of an element on many elements, in order. For ENERGY_REST, `batch.x` is the rest shape. `work` has
+   room for all inputs and results of one. */
+ENERGY_ROUTINE void @mixed_run_each(const @element *element, const @layout *layout, int32_t routine, @mixed_batch *all,
+                                    size_t first, size_t count, @real *work) {
     const int32_t none[3] = {0, 0, 0};
     const int is_known = routine >= 0 && routine < ENERGY_ROUTINES;
     const int32_t *sizes = is_known ? element->sizes[routine] : none;

@@ -1,5 +1,5 @@
-//! Elements with other unknowns than points of their own, or with a state: their unknowns, loops over elements, kernels of
-//! CUDA.
+//! Elements with other unknowns than points of their own, or with a state: their unknowns, loops over elements, kernels
+//! of CUDA.
 
 use std::fmt::Write as _;
 

@@ -1,8 +1,8 @@
-/* Runs a routine of an element on many elements of mixed unknowns, as many at a time as there are lanes. `work` has room for
-   all inputs and results of one vector of elements, `single` for those of one element. Results are written or added in the
-   order of the elements. */
-ENERGY_FN void @mixed_run_lanes(const @element *element, const @layout *layout, @lanes_run *run, int32_t routine,
-                                @mixed_batch *all, @lanes *work, @real *single) {
+/* Runs a routine of an element on many elements of mixed unknowns, as many at a time as there are lanes. `work` has
+   room for all inputs and results of one vector of elements, `single` for those of one element. Results are written
+   or added in the order of the elements. */
+ENERGY_ROUTINE void @mixed_run_lanes(const @element *element, const @layout *layout, @lanes_run *run, int32_t routine,
+                                     @mixed_batch *all, @lanes *work, @real *single) {
     const int is_single = routine <= ENERGY_REST || routine >= ENERGY_ROUTINES;
     const int32_t *sizes = element->sizes[is_single ? ENERGY_REST : routine];
     const int has_velocities = @reads_velocities(routine);

@@ -171,8 +171,8 @@ impl Element<'_> {
         Code { routines, body }
     }
 
-    /// Adds numbers of the Hessian times the incoming adjoint. The derivative of the gradient g along exp(δ) has half of
-    /// the cross product of g with the adjoint besides.
+    /// Adds numbers of the Hessian times the incoming adjoint. The derivative of the gradient g along exp(δ) has half
+    /// of the cross product of g with the adjoint besides.
     fn product(&self, to: &Argument, vector: &Argument) -> String {
         let first = vector.first;
         if turns(to, vector) {
