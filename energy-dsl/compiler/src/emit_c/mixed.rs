@@ -146,3 +146,46 @@ impl Element<'_> {
         self.plan.declaration.state.iter().map(|field| field.size).sum()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use crate::{Interpreted, Precision, Target, sources};
+
+    fn header(text: &str) -> String {
+        let elements = Interpreted::from_file(text, "text").expect("it compiles");
+        let files = sources(&elements, Target::C, &[Precision::Double]).expect("it is written");
+        let own = |name: &str| name.ends_with("_f64.h") && !name.starts_with("energy_");
+        files.into_iter().find(|file| own(&file.name)).expect("the element has a header").text
+    }
+
+    #[test]
+    fn every_type_of_unknowns_has_a_kind() {
+        let text = header(
+            "residual All(s: Scalar, a: Vec2, b: Vec3, c: Vec4, p: Point2, x: Point, m: Motion, F: Mat2x3) {
+                s * (a.x + b.x + c.x + p.x + x.x + F[1][2]) * transform(m, x)
+            }",
+        );
+        let kinds = "{\n        ENERGY_SCALAR, ENERGY_VEC2, ENERGY_VEC3, ENERGY_VEC4,\n        ENERGY_POINT2, ENERGY_POINT, \
+                     ENERGY_POINT, ENERGY_ROTATION,\n        ENERGY_SCALAR, ENERGY_SCALAR, ENERGY_SCALAR, \
+                     ENERGY_SCALAR,\n        ENERGY_SCALAR, ENERGY_SCALAR};";
+        assert!(text.contains(kinds), "{text}");
+        let text = header("energy Gas(x: Point, shared p: Scalar) { p * x.z }");
+        assert!(text.contains("{\n        ENERGY_POINT, ENERGY_SCALAR + ENERGY_SHARED};"), "{text}");
+        assert!(text.contains("u[4]: x (3), p, shared by all"), "{text}");
+    }
+
+    #[test]
+    fn states_at_rest_are_functions_of_rest_shapes_and_parameters() {
+        let text = header(
+            "energy Bar(x, y: Point; rest X, Y: Vec3; state e: Scalar = 0, l: Scalar = 2 * L; k, L: Scalar) {
+                rest { let R = norm(X - Y); }
+                next { e = e + R; l = l + e; }
+                k * (norm(x - y) - R - e * l - L)^2
+            }",
+        );
+        let (_, function) = text.split_once("bar_f64_state_at_rest(").expect("it has the function");
+        let (function, _) = function.split_once("\n}\n").expect("it ends");
+        assert!(function.contains("state[0] = 0.0;") && function.contains("2.0 * parameters[1]"), "{function}");
+        assert!(text.contains("k, L, then the state: e, l"), "{text}");
+    }
+}
