@@ -101,7 +101,7 @@ impl Element<'_> {
             self.returned(of_type, &format!("energy_{result}")),
         ];
         let forward = Code { routines: vec![kind], body: body.concat() };
-        let (docs, returns) = (docs.to_owned(), of_type.annotation(self.dialect.precision));
+        let (docs, returns) = (self.of_unknowns(docs), of_type.annotation(self.dialect.precision));
         let adjoint = Some(self.adjoint(kind, of_type, &inputs));
         Native { name, docs, arguments: self.declared(&inputs, true), returns, forward, adjoint }
     }
@@ -197,6 +197,11 @@ impl Element<'_> {
         )
     }
 
+    /// Returns words about points as words about unknowns, if some are not points.
+    fn of_unknowns(&self, docs: &str) -> String {
+        if self.plan.declaration.is_mixed() { docs.replace("points", "unknowns") } else { docs.to_owned() }
+    }
+
     /// Returns the function that returns the rows of a constraint.
     pub(super) fn constraint(&self) -> Native<'static> {
         let kind = RoutineKind::ConstraintJacobian;
@@ -205,7 +210,7 @@ impl Element<'_> {
         let body = self.read_arguments(&inputs, true) + &self.call(kind, "") + &self.returned(of_type, "energy_value");
         Native {
             name: "constraint",
-            docs: "Returns C. The adjoint is exact by the points.".to_owned(),
+            docs: self.of_unknowns("Returns C. The adjoint is exact by the points."),
             arguments: self.declared(&inputs, true),
             returns: of_type.annotation(self.dialect.precision),
             forward: Code { routines: vec![kind], body },
