@@ -3,6 +3,7 @@
 
 mod bench;
 mod c;
+mod c_mixed;
 mod command_line;
 mod elements;
 mod errata;

@@ -11,18 +11,18 @@ use verify_command::reference::{Record, mapping};
 use verify_command::stress::sweeps;
 
 /// A compiler of C or C++, with the options that all code must compile with.
-struct Compiler {
+pub struct Compiler {
     command: Vec<String>,
 }
 
 impl Compiler {
     /// Splits a command at its spaces.
-    fn new(command: &str) -> Self {
+    pub fn new(command: &str) -> Self {
         Self { command: command.split_whitespace().map(str::to_owned).collect() }
     }
 
     /// Returns the clang that the variable CLANG names, such as `python3 -m ziglang cc`, or that is in `PATH`.
-    fn clang() -> Self {
+    pub fn clang() -> Self {
         let command = std::env::var("CLANG").unwrap_or_else(|_| "clang".to_owned());
         Self::new(&format!("{command} -std=c99 -march=native"))
     }
@@ -33,15 +33,15 @@ impl Compiler {
     }
 }
 
-const OPTIONS: [&str; 7] = ["-Wall", "-Wextra", "-pedantic", "-Wconversion", "-Werror", "-ffp-contract=off", "-O1"];
+pub const OPTIONS: [&str; 7] = ["-Wall", "-Wextra", "-pedantic", "-Wconversion", "-Werror", "-ffp-contract=off", "-O1"];
 
 /// Returns whether a program can be run.
-fn exists(program: &str) -> bool {
+pub fn exists(program: &str) -> bool {
     Command::new(program).arg("--version").output().is_ok_and(|output| output.status.success())
 }
 
 /// A float with its bits.
-trait Bits: Float + Number<Mask = bool> {
+pub trait Bits: Float + Number<Mask = bool> {
     const PRECISION: Precision;
     fn bytes(self) -> Vec<u8>;
     fn read(bytes: &[u8]) -> (Self, &[u8]);
@@ -74,7 +74,7 @@ bits!(f64, Double);
 bits!(f32, Single);
 
 /// Ordinary inputs, inputs on a lattice, inputs with zeros, coincidences and extreme sizes, sweeps to every singularity.
-fn samples(declaration: &'static energy_dsl::Declaration) -> Vec<Sample> {
+pub fn samples(declaration: &energy_dsl::Declaration) -> Vec<Sample> {
     let mut sampler = Sampler::new(declaration, 17);
     let mut list: Vec<Sample> = (0..8).map(|_| sampler.sample()).collect();
     list.extend((0..8).map(|_| sampler.lattice_sample()));
@@ -92,10 +92,12 @@ fn hostile(sample: &mut Sample, random: &mut fastrand::Rng) {
     let points = sample.positions.len() / 3;
     for _ in 0..=random.usize(..2) {
         let (i, j) = (random.usize(..sample.positions.len()), random.usize(..sample.positions.len()));
+        // Numbers after the last three that are whole belong to no point.
+        let [a, b] = [i, j].map(|number| 3 * (number / 3).min(points.saturating_sub(1)));
         match random.usize(..9) {
-            0 | 1 if points > 1 => sample.positions.copy_within(i / 3 * 3..i / 3 * 3 + 3, j / 3 * 3),
+            0 | 1 if points > 1 => sample.positions.copy_within(a..a + 3, b),
             2 if points > 2 => {
-                let (a, b, c) = (i / 3 * 3, j / 3 * 3, random.usize(..points) * 3);
+                let c = random.usize(..points) * 3;
                 let weight = [0.5, 2.0, -1.0][random.usize(..3)];
                 for axis in 0..3 {
                     let [from, to] = [a, b].map(|point| sample.positions[point + axis]);
@@ -116,8 +118,8 @@ fn hostile(sample: &mut Sample, random: &mut fastrand::Rng) {
 }
 
 /// The inputs of one element.
-struct Case<S> {
-    element: usize,
+pub struct Case<S> {
+    pub element: usize,
     parameters: Vec<S>,
     rest: Vec<S>,
     positions: Vec<S>,
@@ -125,7 +127,7 @@ struct Case<S> {
 }
 
 impl<S: Bits> Case<S> {
-    fn new(element: usize, of: &Interpreted, sample: &Sample) -> Self {
+    pub fn new(element: usize, of: &Interpreted, sample: &Sample) -> Self {
         let numbers = |list: &[f64]| list.iter().map(|&x| S::of(x)).collect::<Vec<S>>();
         let mut velocities = numbers(&sample.velocities);
         velocities.resize(of.coordinates(), S::of(0.0));
@@ -134,7 +136,7 @@ impl<S: Bits> Case<S> {
         Self { element, parameters, rest, positions, velocities }
     }
 
-    fn bytes(&self) -> Vec<u8> {
+    pub fn bytes(&self) -> Vec<u8> {
         let mut bytes = u32::try_from(self.element).unwrap().to_le_bytes().to_vec();
         let Self { parameters, rest, positions, velocities, .. } = self;
         bytes.extend([rest, parameters, positions, velocities].into_iter().flatten().flat_map(|x| x.bytes()));
@@ -147,7 +149,7 @@ impl<S: Bits> Case<S> {
     }
 }
 
-fn folder(name: &str) -> PathBuf {
+pub fn folder(name: &str) -> PathBuf {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
     std::fs::create_dir_all(&folder).unwrap();
     folder
@@ -194,10 +196,10 @@ fn compiled(compiler: &Compiler, elements: &[Interpreted], precision: Precision,
 
 /// Numbers of what was compared.
 #[derive(Debug, Default)]
-struct Counts {
-    routines: usize,
-    flagged: usize,
-    unsettled: usize,
+pub struct Counts {
+    pub routines: usize,
+    pub flagged: usize,
+    pub unsettled: usize,
 }
 
 /// Compares with routines of the tape. `plain` elements lack those of single vertices, which must not change the others.
@@ -245,7 +247,7 @@ fn compare<S: Bits>(elements: &[Interpreted], plain: &[Interpreted], cases: &[Ca
     counts
 }
 
-fn interpreted(declaration: &energy_dsl::Declaration) -> Interpreted {
+pub fn interpreted(declaration: &energy_dsl::Declaration) -> Interpreted {
     let text = &declaration.source;
     let elements = Interpreted::from_file_with_vertices(text, "element", &Budget::default()).expect("it compiles");
     elements.into_iter().next_back().expect("it declares the element")
@@ -275,47 +277,74 @@ fn cases<S: Bits>(elements: &[Interpreted]) -> Vec<Case<S>> {
     cases
 }
 
-fn check<S: Bits>(compiler: &Compiler, name: &str) {
+/// Elements to compare, in text and compiled, with and without routines of single vertices, and inputs for them.
+pub struct Suite<S> {
+    pub text: String,
+    pub elements: Vec<Interpreted>,
+    pub plain: Vec<Interpreted>,
+    pub cases: Vec<Case<S>>,
+}
+
+impl<S: Bits> Suite<S> {
+    /// Returns all elements of points of the library, and all residuals.
+    fn of_points() -> Self {
+        let all = catalogue::elements();
+        let elements: Vec<Interpreted> = all.iter().map(|entry| interpreted(entry.declaration)).collect();
+        let plain = |entry: &energy_dsl::AnyElement| {
+            Interpreted::from_source(&entry.declaration.source).unwrap().pop().unwrap()
+        };
+        Self {
+            text: all.iter().map(|entry| format!("{}\n", entry.declaration.source)).collect(),
+            plain: all.iter().map(plain).collect(),
+            cases: cases(&elements),
+            elements,
+        }
+    }
+}
+
+/// Compares all elements of a suite; `None` if there is no such compiler.
+pub fn check<S: Bits>(compiler: &Compiler, name: &str, suite: impl FnOnce() -> Suite<S>) -> Option<Counts> {
     if !compiler.exists() {
         println!("skipped: there is no {}", compiler.command[0]);
-        return;
+        return None;
     }
     if energy_dsl::level() == energy_dsl::LevelName::Baseline && cfg!(target_arch = "x86_64") {
         println!("skipped: this processor has no fused operations");
-        return;
+        return None;
     }
-    let elements: Vec<Interpreted> = catalogue::elements().iter().map(|entry| interpreted(entry.declaration)).collect();
+    let Suite { text, elements, plain, cases } = suite();
     let folder = folder(name);
-    let text: String = catalogue::elements().iter().map(|entry| format!("{}\n", entry.declaration.source)).collect();
     std::fs::write(folder.join("elements.energy"), text).unwrap();
     let program = compiled(compiler, &elements, S::PRECISION, &folder);
-    let cases = cases::<S>(&elements);
     let records = folder.join("records");
     std::fs::write(&records, cases.iter().flat_map(Case::bytes).collect::<Vec<u8>>()).unwrap();
     let output = Command::new(program).arg(&records).output().unwrap();
     assert!(output.status.success(), "{}", output.status);
-    let of =
-        |entry: &energy_dsl::AnyElement| Interpreted::from_source(&entry.declaration.source).unwrap().pop().unwrap();
-    let plain: Vec<Interpreted> = catalogue::elements().iter().map(of).collect();
     let counts = compare(&elements, &plain, &cases, &output.stdout);
     println!("{name}: {} inputs, {counts:?}", cases.len());
     assert!(counts.unsettled * 4 < counts.routines, "{counts:?}");
-    assert!(counts.routines > 10_000 && elements.iter().any(|e| e.declaration().kind == Kind::Residual));
+    Some(counts)
+}
+
+fn check_points<S: Bits>(compiler: &Compiler, name: &str) {
+    let counts = check::<S>(compiler, name, Suite::of_points);
+    assert!(counts.is_none_or(|counts| counts.routines > 10_000));
+    assert!(catalogue::elements().iter().any(|entry| entry.declaration.kind == Kind::Residual));
 }
 
 #[test]
 fn c_has_the_bits_of_rust() {
-    check::<f64>(&Compiler::new("gcc -std=c99"), "c-f64");
+    check_points::<f64>(&Compiler::new("gcc -std=c99"), "c-f64");
 }
 
 #[test]
 fn c_in_single_precision_has_the_bits_of_rust() {
-    check::<f32>(&Compiler::new("gcc -std=c99"), "c-f32");
+    check_points::<f32>(&Compiler::new("gcc -std=c99"), "c-f32");
 }
 
 #[test]
 fn c_by_clang_has_the_bits_of_rust() {
-    check::<f64>(&Compiler::clang(), "c-clang-f64");
+    check_points::<f64>(&Compiler::clang(), "c-clang-f64");
 }
 
 /// Projected Hessians are the nearest positive semi-definite matrices: Q max(Λ, 0) Qᵀ of nalgebra's decomposition.

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use energy_compiler::{Budget, Interpreted, Precision, Target, sources};
-use energy_dsl::{Float, Inputs, Kind, Number};
+use energy_dsl::{Declaration, Float, Inputs, Kind, Number, triangle_index};
 use verify::sample::{Sample, Sampler};
 use verify_command::catalogue;
 use verify_command::stress::sweeps;
@@ -88,13 +88,13 @@ fn script(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests").join(name)
 }
 
-fn interpreted(declaration: &energy_dsl::Declaration) -> Interpreted {
+fn interpreted(declaration: &Declaration) -> Interpreted {
     let elements = Interpreted::from_file_with_vertices(&declaration.source, "element", &Budget::default());
     elements.expect("it compiles").into_iter().next_back().expect("it declares the element")
 }
 
 /// Ordinary inputs, inputs on a lattice, inputs with coincidences and extreme sizes, sweeps to every singularity.
-fn samples(declaration: &'static energy_dsl::Declaration) -> Vec<Sample> {
+fn samples(declaration: &Declaration) -> Vec<Sample> {
     let mut sampler = Sampler::new(declaration, 23);
     let mut list: Vec<Sample> = (0..6).map(|_| sampler.sample()).collect();
     list.extend((0..6).map(|_| sampler.lattice_sample()));
@@ -154,9 +154,14 @@ impl<S: Bits> Found<S> {
 }
 
 /// Returns the numbers that a function of Warp returns or writes, from the groups of the Rust routine.
-fn expected<S: Copy>(routine: &str, groups: &[Vec<S>], points: usize) -> Vec<S> {
+fn expected<S: Copy>(routine: &str, groups: &[Vec<S>], declaration: &Declaration) -> Vec<S> {
+    let (points, n) = (declaration.points.len(), declaration.increments());
     match routine {
         "gradient" | "hessian_vector" | "force" | "residual" | "value" => groups[groups.len() - 1].clone(),
+        "hessian" | "gauss_newton" if declaration.is_mixed() => {
+            let number = |place: usize| triangle_index(n, (place / n).min(place % n), (place / n).max(place % n));
+            groups[1].iter().copied().chain((0..n * n).map(|place| groups[2][number(place)])).collect()
+        }
         "hessian" | "gauss_newton" => {
             let block = |i: usize, j: usize| &groups[2][9 * (i * points - i * (i + 1) / 2 + j)..][..9];
             let all = (0..points * points).flat_map(|place| {
@@ -170,7 +175,7 @@ fn expected<S: Copy>(routine: &str, groups: &[Vec<S>], points: usize) -> Vec<S> 
     }
 }
 
-const ROUTINES: [&str; 13] = [
+const ROUTINES: [&str; 16] = [
     "value",
     "gradient",
     "hessian_vector",
@@ -184,12 +189,14 @@ const ROUTINES: [&str; 13] = [
     "vertex_2",
     "vertex_3",
     "gauss_newton",
+    "next",
+    "next_jacobians",
+    "state_jacobian",
 ];
 
 /// Compares an element with the tape. Returns the numbers of results that were compared, and of those left to rays.
 fn compare<S: Bits>(element: &Interpreted, name: &str, cases: &[Case<S>], folder: &Path) -> (usize, usize) {
     let (mut compared, mut left) = (0, 0);
-    let points = element.coordinates() / 3;
     let rest = Found::<S>::read(folder, &format!("{name}_rest"));
     let flags = Found::<S>::read(folder, &format!("{name}_flags")).expect("every element has flags");
     for routine in ROUTINES {
@@ -212,7 +219,7 @@ fn compare<S: Bits>(element: &Interpreted, name: &str, cases: &[Case<S>], folder
                 assert_eq!((own & 1 != 0, own & 2 != 0), (wanted.degenerate, wanted.kink), "{name}, {routine}: flags");
             }
             for (place, (&is, wanted)) in
-                found.row(number, cases.len()).iter().zip(expected(routine, &groups, points)).enumerate()
+                found.row(number, cases.len()).iter().zip(expected(routine, &groups, element.declaration())).enumerate()
             {
                 let input = (&case.positions, &case.parameters, &case.rest);
                 assert!(is.same(wanted), "{name}, {routine}, number {place}: {is:?} for {wanted:?} at {input:?}");
@@ -223,15 +230,15 @@ fn compare<S: Bits>(element: &Interpreted, name: &str, cases: &[Case<S>], folder
     (compared, left)
 }
 
-fn check<S: Bits>(name: &str) {
-    let Some(python) = python().filter(|_| has_fused_operations()) else { return };
-    let elements: Vec<Interpreted> = catalogue::elements().iter().map(|entry| interpreted(entry.declaration)).collect();
+/// Compares elements. Returns how many numbers were compared; `None` without Warp.
+fn check<S: Bits>(name: &str, elements: impl FnOnce() -> Vec<Interpreted>) -> Option<usize> {
+    let python = python().filter(|_| has_fused_operations())?;
+    let elements = elements();
     let folder = folder(name, &elements, S::PRECISION);
-    let all: Vec<Vec<Case<S>>> = catalogue::elements()
-        .iter()
-        .zip(&elements)
-        .map(|(entry, element)| samples(entry.declaration).iter().map(|sample| Case::new(element, sample)).collect())
-        .collect();
+    let cases = |element: &Interpreted| {
+        samples(element.declaration()).iter().map(|sample| Case::new(element, sample)).collect()
+    };
+    let all: Vec<Vec<Case<S>>> = elements.iter().map(cases).collect();
     let module = std::fs::read_to_string(folder.join("energies.py")).unwrap();
     let names = module.lines().filter_map(|line| line.strip_prefix("    \"")?.strip_suffix("\": {"));
     let names: Vec<String> = names.map(str::to_owned).collect();
@@ -248,17 +255,51 @@ fn check<S: Bits>(name: &str) {
         total = (total.0 + compared, total.1 + left);
     }
     println!("{name}: {} numbers compared, {} results left to rays", total.0, total.1);
-    assert!(total.0 > 100_000 && elements.iter().any(|element| element.declaration().kind == Kind::Residual));
+    Some(total.0)
+}
+
+fn check_points<S: Bits>(name: &str) {
+    let all = catalogue::elements();
+    let elements = || all.iter().map(|entry| interpreted(entry.declaration)).collect();
+    assert!(check::<S>(name, elements).is_none_or(|compared| compared > 100_000));
+    assert!(all.iter().any(|entry| entry.declaration.kind == Kind::Residual));
+}
+
+/// One or two of each kind of declaration and of unknowns: kernels take long to compile.
+const MIXED: [&str; 9] =
+    ["GasInTriangle", "HotBar", "Arm", "Ring3", "Anchor", "Thrust", "Transported", "Turning", "Maxwell"];
+
+fn mixed() -> Vec<Interpreted> {
+    let text = include_str!("../../tests/unknowns.energy");
+    let all = Interpreted::from_file(text, "unknowns.energy").expect("it compiles");
+    all.into_iter().filter(|element| MIXED.contains(&&*element.declaration().name)).collect()
 }
 
 #[test]
 fn warp_has_the_bits_of_rust() {
-    check::<f64>("warp-f64");
+    check_points::<f64>("warp-f64");
 }
 
 #[test]
 fn warp_in_single_precision_has_the_bits_of_rust() {
-    check::<f32>("warp-f32");
+    check_points::<f32>("warp-f32");
+}
+
+#[test]
+fn warp_of_mixed_unknowns_has_the_bits_of_rust() {
+    for (name, compared) in
+        [("f64", check::<f64>("warp-mixed-f64", mixed)), ("f32", check::<f32>("warp-mixed-f32", mixed))]
+    {
+        assert!(compared.is_none_or(|compared| compared > 10_000), "{name}");
+    }
+}
+
+/// Adjoints of rotations are tangent to unit quaternions, up to second order.
+#[test]
+fn adjoints_of_mixed_unknowns_are_generated_derivatives() {
+    let Some(python) = python() else { return };
+    let folder = folder("warp-mixed-adjoints", &mixed(), Precision::Double);
+    println!("{}", run(&python, &script("warp_mixed.py"), &folder));
 }
 
 /// Adjoints of values are generated gradients with equal bits; those of gradients, forces, residuals and constraints are

@@ -22,6 +22,11 @@ pub(super) struct Element<'a> {
 }
 
 impl Element<'_> {
+    /// Returns whether the unknowns are one flat array, `u`: those of residuals, and mixed ones.
+    pub(super) fn is_flat(&self) -> bool {
+        self.plan.declaration.kind == Kind::Residual || self.plan.declaration.is_mixed()
+    }
+
     /// Writes all routines.
     pub(super) fn routines(&self) -> String {
         self.moving(&self.routine(&self.plan.rest, false)) + &self.vertex()
@@ -153,7 +158,7 @@ impl Element<'_> {
     /// Returns the expression that reads an input.
     pub(super) fn read(&self, input: Input, is_term: bool) -> String {
         match input {
-            Input::Position(i) if self.plan.declaration.kind == Kind::Residual => format!("u[{i}]"),
+            Input::Position(i) if self.is_flat() => format!("u[{i}]"),
             Input::Position(i) => format!("x[{i}]"),
             Input::Velocity(i) => format!("v[{i}]"),
             Input::Increment(_) => unreachable!("compiler bug: increments are 0, and nothing reads them"),

@@ -3,9 +3,9 @@
 use std::fmt::Write as _;
 
 use super::element::Element;
-use crate::interpreted::InputKind;
+use crate::interpreted::{InputKind, InputNumbers};
 use crate::plan::groups;
-use energy_runtime::{Kind, RoutineKind};
+use energy_runtime::RoutineKind;
 
 /// An argument of a function: an array.
 pub(super) struct Argument {
@@ -37,36 +37,30 @@ impl Element<'_> {
     }
 
     pub(super) fn function(&self, kind: RoutineKind, sizes: &[usize]) -> Function {
-        let docs = |kinds: &[InputKind]| {
-            let list = self.inputs.iter().filter(|input| kinds.contains(&input.kind)).map(|input| {
-                let unit = if input.unit.is_empty() { String::new() } else { format!(" in {}", input.unit) };
-                let size = if input.size() == 1 { String::new() } else { format!(" ({})", input.size()) };
-                format!("{}{size}{unit}", input.name)
-            });
-            list.collect::<Vec<_>>().join(", ")
-        };
-        let coordinates = self.plan.coordinates;
-        let is_residual = self.plan.declaration.kind == Kind::Residual;
+        let docs = |kinds: &[InputKind]| self.listed(kinds);
+        let (coordinates, increments) = (self.plan.coordinates, self.plan.declaration.increments());
         let parameters =
             Argument { name: "parameters", size: self.plan.parameters, docs: docs(&[InputKind::Parameter]) };
         let mut arguments = match kind {
             RoutineKind::Rest => {
                 vec![Argument { name: "rest", size: self.plan.shape, docs: docs(&[InputKind::Rest]) }]
             }
-            _ if is_residual => {
+            _ if self.is_flat() => {
                 vec![Argument { name: "u", size: coordinates, docs: docs(&[InputKind::Unknown]) }]
             }
             _ => vec![Argument { name: "x", size: coordinates, docs: docs(&[InputKind::Point]) }],
         };
-        match kind {
-            RoutineKind::HessianVector => {
-                arguments.push(Argument { name: "v", size: coordinates, docs: "a vector for each point".into() });
+        let is_mixed = self.plan.declaration.is_mixed();
+        let of_vectors = match (kind, is_mixed) {
+            (RoutineKind::HessianVector, false) => Some("a vector for each point"),
+            (RoutineKind::HessianVector, true) => Some("a number for each increment"),
+            (RoutineKind::Force | RoutineKind::Jacobians, false) => Some("the velocities of the points"),
+            (RoutineKind::Force | RoutineKind::Jacobians, true) => {
+                Some("the velocities of the unknowns; those of rotations are angular")
             }
-            RoutineKind::Force | RoutineKind::Jacobians => {
-                arguments.push(Argument { name: "v", size: coordinates, docs: "the velocities of the points".into() });
-            }
-            _ => {}
-        }
+            _ => None,
+        };
+        arguments.extend(of_vectors.map(|docs| Argument { name: "v", size: increments, docs: docs.to_owned() }));
         arguments.push(parameters);
         if kind != RoutineKind::Rest {
             let docs = "what the rest shape determines".to_owned();
@@ -75,10 +69,25 @@ impl Element<'_> {
         let result = |(&(name, _), &size): (&(&'static str, _), &usize)| Argument {
             name: if kind == RoutineKind::Rest { "stored" } else { name },
             size,
-            docs: result_docs(kind, name).to_owned(),
+            docs: if is_mixed { mixed_docs(kind, name) } else { result_docs(kind, name) }.to_owned(),
         };
         let results = groups(kind).iter().zip(sizes).map(result).collect();
         Function { kind, name: kind.name().to_owned(), arguments, results }
+    }
+
+    /// Lists inputs with their sizes and units. The state is marked, and unknowns that all elements share.
+    fn listed(&self, kinds: &[InputKind]) -> String {
+        let declaration = &self.plan.declaration;
+        let state = self.inputs.len() - declaration.state.len();
+        let describe = |(place, input): (usize, &InputNumbers)| {
+            let unit = if input.unit.is_empty() { String::new() } else { format!(" in {}", input.unit) };
+            let size = if input.size() == 1 { String::new() } else { format!(" ({})", input.size()) };
+            let before = if place == state { "then the state: " } else { "" };
+            let is_shared = declaration.points.get(place).is_some_and(|field| field.shared);
+            format!("{before}{}{size}{unit}{}", input.name, if is_shared { ", shared by all" } else { "" })
+        };
+        let list = self.inputs.iter().enumerate().filter(|(_, input)| kinds.contains(&input.kind)).map(describe);
+        list.collect::<Vec<_>>().join(", ")
     }
 
     pub(super) fn comment(&self, function: &Function) -> String {
@@ -134,11 +143,27 @@ fn result_docs(kind: RoutineKind, name: &str) -> &'static str {
         (RoutineKind::Residual | RoutineKind::Jacobian, "value") => "one number a row",
         (RoutineKind::Jacobian, _) => "row by row",
         (RoutineKind::Vertex(_), "gradient") => "by the point",
+        (RoutineKind::Next | RoutineKind::NextJacobians, "state") => "the state",
+        (_, "by_unknowns") => "its derivatives by the unknowns, row by row",
+        (_, "by_state") => "derivatives by the state before, row by row",
         (RoutineKind::Vertex(_), "block") => "second derivatives by the point, row by row",
         (_, "hessian" | "hessians") => "3x3 blocks (i, j) with i <= j, row by row",
         (_, "by_position" | "by_velocity") => "3x3 blocks (i, j), row by row",
         (_, "jacobian") => "a vector for each row and point",
         (_, "value") => "U, or C",
         _ => "a vector for each point",
+    }
+}
+
+/// Documents results of mixed unknowns, whose matrices are flat.
+fn mixed_docs(kind: RoutineKind, name: &str) -> &'static str {
+    match (kind, name) {
+        (_, "gradient" | "product" | "force") => "a number for each increment",
+        (_, "hessian") => "the upper triangle, row by row",
+        (_, "hessians") => "the upper triangle of each row of C, row by row",
+        (_, "by_position" | "by_velocity") => "row by row",
+        (_, "jacobian") => "a number for each row and increment",
+        (_, "by_unknowns") => "its derivatives by the increments of the unknowns, row by row",
+        _ => result_docs(kind, name),
     }
 }

@@ -36,10 +36,10 @@ impl Element<'_> {
     /// Writes the loop over elements: one at a time, or vectors of them.
     pub(super) fn loops(&self, in_lanes: bool) -> String {
         let (name, precision, real) = (self.name, self.dialect.precision.name(), self.dialect.precision.real());
-        let results = |function: &Function| function.results.iter().map(|result| result.size).sum::<usize>();
-        let results = self.functions().iter().map(results).max().unwrap_or_default();
-        let Plan { coordinates, parameters, shape, .. } = self.plan;
-        let room = coordinates.max(shape) + coordinates + parameters + self.plan.stored() + results;
+        let room = self.room();
+        if self.has_mixed_loops() {
+            return format!("{}{}", if in_lanes { "" } else { "\n" }, self.mixed_loops(in_lanes));
+        }
         match in_lanes {
             false => format!(
                 "\nvoid {name}_evaluate(int32_t routine, energy_{precision}_batch *batch) {{\n    {real} \
@@ -55,56 +55,32 @@ impl Element<'_> {
         }
     }
 
+    /// Returns the count of numbers of all inputs and results of one element.
+    pub(super) fn room(&self) -> usize {
+        let results = |function: &Function| function.results.iter().map(|result| result.size).sum::<usize>();
+        let results = self.functions().iter().map(results).max().unwrap_or_default();
+        let Plan { coordinates, parameters, shape, .. } = self.plan;
+        coordinates.max(shape) + coordinates + parameters + self.plan.stored() + results
+    }
+
     /// Writes a kernel of CUDA for each routine, one element a thread, and a function that launches them.
     pub(super) fn kernels(&self) -> String {
-        let (name, real) = (self.name, self.dialect.precision.real());
-        let batch = format!("energy_{}_batch", self.dialect.precision.name());
-        let function = |function: &str, arguments: &str| {
-            format!("energy_{}_{function}({arguments});", self.dialect.precision.name())
-        };
+        let name = self.name;
+        let (batch, count) = if self.has_mixed_loops() { ("mixed_batch", "batch.count") } else { ("batch", "count") };
+        let batch = format!("energy_{}_{batch}", self.dialect.precision.name());
         let (mut text, mut cases) = (String::new(), String::new());
-        for Function { kind, name: routine, arguments, results } in self.functions() {
-            // One kernel has all vertices.
-            let is_vertex = matches!(kind, RoutineKind::Vertex(_));
-            let routine = if is_vertex { "vertex".to_owned() } else { routine };
-            if is_vertex && kind != RoutineKind::Vertex(0) {
+        for function in self.functions() {
+            // One kernel has all vertices; loops of mixed unknowns have none.
+            let is_vertex = matches!(function.kind, RoutineKind::Vertex(_));
+            if is_vertex && (self.has_mixed_loops() || function.kind != RoutineKind::Vertex(0)) {
                 continue;
             }
-            let _ = writeln!(text, "__global__ void {name}_{routine}_kernel({batch} batch) {{");
-            let _ = writeln!(text, "    const size_t i = (size_t)blockIdx.x * blockDim.x + threadIdx.x;");
-            for array in arguments.iter().chain(&results) {
-                // A vertex that does not exist has no results.
-                let zero = if is_vertex { " = {0}" } else { "" };
-                let _ = writeln!(text, "    {real} {}[{}]{zero};", array.name, array.size.max(1));
-            }
-            text.push_str("    unsigned flags;\n    if (i >= batch.count) {\n        return;\n    }\n");
-            for Argument { name, size, .. } in &arguments {
-                let (how, from) = match *name {
-                    "x" | "u" => ("read_points", "&batch, &batch.x"),
-                    "v" => ("read_points", "&batch, &batch.v"),
-                    "rest" => ("read", "&batch.x"),
-                    "parameters" => ("read", "&batch.parameters"),
-                    _ => ("read", "&batch.stored"),
-                };
-                let _ = writeln!(text, "    {}", function(how, &format!("{from}, i, {size}, {name}")));
-            }
-            let list: Vec<&str> = arguments.iter().chain(&results).map(|array| array.name).collect();
-            let (before, point) = match is_vertex {
-                true => ("batch.points == NULL ? ENERGY_DEGENERATE : ", "(int32_t)batch.points[i], "),
-                false => ("", ""),
-            };
-            let _ = writeln!(text, "    flags = {before}{name}_{routine}({point}{});", list.join(", "));
-            for (place, Argument { name, size, .. }) in results.iter().enumerate() {
-                let slots = format!(
-                    "energy_{}_slot_size(ENERGY_{}, {place}, {size})",
-                    self.dialect.precision.name(),
-                    routine.to_uppercase()
-                );
-                let coordinates = if is_vertex { 3 } else { self.plan.coordinates };
-                let write = format!("&batch.results[{place}], i, {size}, {slots}, {coordinates}, {name}");
-                let _ = writeln!(text, "    {}", function("write", &write));
-            }
-            let _ = writeln!(text, "    {}\n}}\n", function("device_note", "&batch, i, flags"));
+            let routine = if is_vertex { "vertex" } else { &function.name };
+            text.push_str(&if self.has_mixed_loops() {
+                self.mixed_kernel(&function)
+            } else {
+                self.kernel(&function, routine)
+            });
             let constant = routine.to_uppercase();
             let _ = writeln!(
                 cases,
@@ -116,10 +92,58 @@ impl Element<'_> {
             text,
             "/* Runs a routine on many elements on a GPU. All arrays of the batch are in its memory. */\nextern \"C\" \
              cudaError_t {name}_launch(int32_t routine, const {batch} *batch, cudaStream_t stream) {{\n    const unsigned \
-             threads = 128U;\n    const unsigned blocks = (unsigned)((batch->count + threads - 1U) / threads);\n    if \
+             threads = 128U;\n    const unsigned blocks = (unsigned)((batch->{count} + threads - 1U) / threads);\n    if \
              (blocks == 0U) {{\n        return cudaSuccess;\n    }}\n    switch (routine) {{\n{cases}    default:\n        \
              return cudaErrorInvalidValue;\n    }}\n    return cudaGetLastError();\n}}\n"
         );
+        text
+    }
+
+    /// Writes the kernel of a routine, or of all single vertices.
+    fn kernel(&self, function: &Function, routine: &str) -> String {
+        let Function { kind, arguments, results, .. } = function;
+        let (name, real) = (self.name, self.dialect.precision.real());
+        let is_vertex = matches!(kind, RoutineKind::Vertex(_));
+        let batch = format!("energy_{}_batch", self.dialect.precision.name());
+        let call = |function: &str, arguments: &str| {
+            format!("energy_{}_{function}({arguments});", self.dialect.precision.name())
+        };
+        let mut text = String::new();
+        let _ = writeln!(text, "__global__ void {name}_{routine}_kernel({batch} batch) {{");
+        let _ = writeln!(text, "    const size_t i = (size_t)blockIdx.x * blockDim.x + threadIdx.x;");
+        for array in arguments.iter().chain(results) {
+            // A vertex that does not exist has no results.
+            let zero = if is_vertex { " = {0}" } else { "" };
+            let _ = writeln!(text, "    {real} {}[{}]{zero};", array.name, array.size.max(1));
+        }
+        text.push_str("    unsigned flags;\n    if (i >= batch.count) {\n        return;\n    }\n");
+        for Argument { name, size, .. } in arguments {
+            let (how, from) = match *name {
+                "x" | "u" => ("read_points", "&batch, &batch.x"),
+                "v" => ("read_points", "&batch, &batch.v"),
+                "rest" => ("read", "&batch.x"),
+                "parameters" => ("read", "&batch.parameters"),
+                _ => ("read", "&batch.stored"),
+            };
+            let _ = writeln!(text, "    {}", call(how, &format!("{from}, i, {size}, {name}")));
+        }
+        let list: Vec<&str> = arguments.iter().chain(results).map(|array| array.name).collect();
+        let (before, point) = match is_vertex {
+            true => ("batch.points == NULL ? ENERGY_DEGENERATE : ", "(int32_t)batch.points[i], "),
+            false => ("", ""),
+        };
+        let _ = writeln!(text, "    flags = {before}{name}_{routine}({point}{});", list.join(", "));
+        for (place, Argument { name, size, .. }) in results.iter().enumerate() {
+            let slots = format!(
+                "energy_{}_slot_size(ENERGY_{}, {place}, {size})",
+                self.dialect.precision.name(),
+                routine.to_uppercase()
+            );
+            let coordinates = if is_vertex { 3 } else { self.plan.coordinates };
+            let write = format!("&batch.results[{place}], i, {size}, {slots}, {coordinates}, {name}");
+            let _ = writeln!(text, "    {}", call("write", &write));
+        }
+        let _ = writeln!(text, "    {}\n}}\n", call("device_note", "&batch, i, flags"));
         text
     }
 

@@ -11,6 +11,7 @@ mod expression;
 mod folder;
 mod function;
 mod host;
+mod mixed;
 mod numbers;
 mod routine;
 mod tape;
@@ -22,7 +23,6 @@ use std::fmt::Write as _;
 use crate::interpreted::Interpreted;
 use dialect::{Dialect, Numbers};
 use element::Element;
-use energy_runtime::{Field, FieldKind};
 use expression::Meanings;
 
 pub use dialect::Precision;
@@ -72,20 +72,13 @@ pub fn sources(
     if let Some(place) = (1..names.len()).find(|&place| names[..place].contains(&names[place])) {
         return Err(SourceError::SameName { name: names[place].clone() });
     }
-    let beyond = |element: &&Interpreted| {
-        let declaration = element.declaration();
-        let turns = |field: &Field| field.kind == FieldKind::Rotation;
-        declaration.is_mixed() || !declaration.state.is_empty() || declaration.points.iter().any(turns)
-    };
-    if let Some(element) = elements.iter().find(beyond) {
-        return Err(SourceError::Unknowns { name: element.declaration().name.to_string() });
-    }
     if target == Target::Warp {
         return Ok(vec![warp::module(elements, &names, precisions)]);
     }
     let mut files: Vec<SourceFile> =
         precisions.iter().flat_map(|&of| of_precision(elements, &names, target, of)).collect();
-    files.extend(project(&files, target, precisions));
+    let has_mixed = elements.iter().any(|element| mixed::has_mixed_loops(element.declaration()));
+    files.extend(project(&files, target, precisions, has_mixed));
     Ok(files)
 }
 
@@ -98,21 +91,12 @@ pub enum SourceError {
         /// The name.
         name: String,
     },
-    /// An element has unknowns that are not points of its own, or a state.
-    Unknowns {
-        /// Name of the element.
-        name: String,
-    },
 }
 
 impl std::fmt::Display for SourceError {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
             Self::SameName { name } => write!(f, "two declarations are called `{name}` in C; rename one of them"),
-            Self::Unknowns { name } => write!(
-                f,
-                "`{name}` has unknowns other than points, or a state; these are written in Rust only. Leave it out"
-            ),
         }
     }
 }
@@ -129,6 +113,11 @@ fn of_precision(elements: &[Interpreted], names: &[String], target: Target, prec
         shared("_loops", "Loops over elements.", numbers::loops(precision)),
         shared("_lanes", "Vectors of numbers, and loops over vectors of elements.", numbers::lanes(precision)),
     ];
+    if elements.iter().any(|element| mixed::has_mixed_loops(element.declaration())) {
+        let about = "Loops over elements of mixed unknowns and with states.";
+        files.push(shared("_mixed", about, numbers::mixed(precision)));
+        files.push(shared("_mixed_lanes", "The same in vectors.", numbers::mixed_lanes(precision)));
+    }
     let dialect = Dialect { precision, numbers: Numbers::Plain, operators: target != Target::Cuda };
     let meanings = Meanings::default();
     let source = if target == Target::Cpp { "cpp" } else { "c" };
@@ -144,7 +133,9 @@ fn of_precision(elements: &[Interpreted], names: &[String], target: Target, prec
         let text = format!("#include \"{name}.h\"\n\n{}{}", written.description(), written.loops(false));
         add(&format!(".{source}"), text);
         let operators = Element { dialect: Dialect { operators: true, ..dialect }, ..written };
-        let text = format!("#include \"{name}.h\"\n#include \"energy_{suffix}_lanes.h\"\n\n{}", operators.lanes());
+        let mixed = if written.has_mixed_loops() { "_mixed" } else { "" };
+        let text =
+            format!("#include \"{name}.h\"\n#include \"energy_{suffix}{mixed}_lanes.h\"\n\n{}", operators.lanes());
         add(&format!("_lanes.{source}"), text);
         if target == Target::Cuda {
             add(".cu", format!("#include \"{name}.h\"\n\n{}", operators.kernels()));
@@ -154,7 +145,7 @@ fn of_precision(elements: &[Interpreted], names: &[String], target: Target, prec
 }
 
 /// Returns the files that describe a folder and build it.
-fn project(files: &[SourceFile], target: Target, precisions: &[Precision]) -> [SourceFile; 2] {
+fn project(files: &[SourceFile], target: Target, precisions: &[Precision], has_mixed: bool) -> [SourceFile; 2] {
     let is_source = |name: &str| [".c", ".cpp", ".cu"].iter().any(|ending| name.ends_with(ending));
     let sources: Vec<String> =
         files.iter().filter(|file| is_source(&file.name)).map(|file| format!("  {}", file.name)).collect();
@@ -166,7 +157,8 @@ fn project(files: &[SourceFile], target: Target, precisions: &[Precision]) -> [S
     let cmake =
         include_str!("CMakeLists.txt.in").replace("@LANGUAGE@", language).replace("@FILES@", &sources.join("\n"));
     let described: Vec<&str> = precisions.iter().map(|precision| precision.described()).collect();
-    let readme = include_str!("README.md.in").replace("@PRECISIONS@", &described.join(" and "));
+    let mut readme = include_str!("README.md.in").replace("@PRECISIONS@", &described.join(" and "));
+    readme.push_str(if has_mixed { include_str!("mixed.md.in") } else { "" });
     [("CMakeLists.txt", cmake), ("README.md", readme)].map(|(name, text)| folder::stamped(name, &[], &text).shared())
 }
 
@@ -174,12 +166,16 @@ fn project(files: &[SourceFile], target: Target, precisions: &[Precision]) -> [S
 fn header(element: &Element<'_>) -> String {
     let (name, suffix) = (element.name, element.dialect.precision.name());
     let guard = format!("{}_H", name.to_uppercase());
+    let (included, batch, layout) = match element.has_mixed_loops() {
+        true => ("mixed", "mixed_batch", element.at_rest() + &element.layout()),
+        false => ("loops", "batch", String::new()),
+    };
     format!(
-        "#ifndef {guard}\n#define {guard}\n\n#include \"energy_{suffix}_loops.h\"\n\n#ifdef __cplusplus\nextern \"C\" \
-         {{\n#endif\n\n{}/* The element, for hosts that do not know it. */\nextern const energy_{suffix}_element \
+        "#ifndef {guard}\n#define {guard}\n\n#include \"energy_{suffix}_{included}.h\"\n\n#ifdef __cplusplus\nextern \"C\" \
+         {{\n#endif\n\n{}{layout}/* The element, for hosts that do not know it. */\nextern const energy_{suffix}_element \
          {name};\n\n/* Runs a routine on many elements: one at a time, and vectors of them with the same results. \
-         */\nvoid {name}_evaluate(int32_t routine, energy_{suffix}_batch *batch);\nvoid {name}_evaluate_lanes(int32_t \
-         routine, energy_{suffix}_batch *batch);\n\n#ifdef __cplusplus\n}}\n#endif\n\n#endif\n",
+         */\nvoid {name}_evaluate(int32_t routine, energy_{suffix}_{batch} *batch);\nvoid {name}_evaluate_lanes(int32_t \
+         routine, energy_{suffix}_{batch} *batch);\n\n#ifdef __cplusplus\n}}\n#endif\n\n#endif\n",
         element.routines()
     )
 }

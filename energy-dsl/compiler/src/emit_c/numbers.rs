@@ -60,6 +60,19 @@ pub(super) fn lanes(precision: Precision) -> String {
     guarded(precision, "_lanes", &includes, &parts)
 }
 
+/// Returns the text of the header of loops over elements of mixed unknowns and with states.
+pub(super) fn mixed(precision: Precision) -> String {
+    let includes = format!("#include \"energy_{}_loops.h\"\n\n", precision.name());
+    guarded(precision, "_mixed", &includes, &[include_str!("mixed.h")])
+}
+
+/// Returns the text of the header of loops over vectors of such elements.
+pub(super) fn mixed_lanes(precision: Precision) -> String {
+    let name = precision.name();
+    let includes = format!("#include \"energy_{name}_lanes.h\"\n#include \"energy_{name}_mixed.h\"\n\n");
+    guarded(precision, "_mixed_lanes", &includes, &[include_str!("mixed_lanes.h")])
+}
+
 fn functions(dialect: Dialect) -> String {
     let traces = elementary_functions(dialect.precision == Precision::Single);
     let functions = traces.iter().map(|trace| function(dialect, trace));

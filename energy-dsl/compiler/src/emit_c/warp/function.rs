@@ -8,7 +8,7 @@ use crate::emit_c::element::Element;
 use crate::emit_c::function::Function;
 use crate::interpreted::InputKind;
 use crate::plan::{Shape, groups};
-use energy_runtime::RoutineKind;
+use energy_runtime::{FieldKind, RoutineKind};
 
 /// Code of a native function: routines whose C text it needs, and its body.
 pub(super) struct Code {
@@ -63,23 +63,41 @@ impl Element<'_> {
     }
 
     pub(super) fn point_arguments(&self) -> Vec<Argument> {
-        arguments(self.inputs, &[InputKind::Point, InputKind::Unknown], "x", "")
+        arguments(self.inputs, &[InputKind::Point, InputKind::Unknown], "x")
     }
 
+    /// Returns the vectors or velocities of the unknowns: numbers for their increments.
     pub(super) fn vector_arguments(&self) -> Vec<Argument> {
-        let mut list = arguments(self.inputs, &[InputKind::Point, InputKind::Unknown], "v", "v_");
-        list.iter_mut().for_each(|vector| vector.docs = format!("vector or velocity at {}", vector.docs));
-        list
+        let mut first = 0;
+        let points = self.point_arguments();
+        let fields = &self.plan.declaration.points;
+        let vector = |(place, point): (usize, &Argument)| {
+            // Arrays of points are an argument for each; other unknowns are an argument for each field.
+            let is_turned = fields.len() == points.len() && fields[place].kind == FieldKind::Rotation;
+            let increments = if is_turned { 3 } else { point.of_type.size() };
+            let vector = point.moved(increments, first, "v", "v_");
+            first += increments;
+            vector
+        };
+        points.iter().enumerate().map(vector).collect()
+    }
+
+    /// Returns the type of a vector of all increments.
+    pub(super) fn type_of_vectors(&self) -> Type {
+        match self.is_flat() {
+            true => Type::of_rows(self.plan.declaration.increments()),
+            false => Type::of_points(self.plan.coordinates),
+        }
     }
 
     pub(super) fn parameter_arguments(&self) -> Vec<Argument> {
-        arguments(self.inputs, &[InputKind::Parameter], "parameters", "")
+        arguments(self.inputs, &[InputKind::Parameter], "parameters")
     }
 
     /// Returns the arguments of a routine, in the order of its C function.
     pub(super) fn inputs_of(&self, kind: RoutineKind) -> Vec<Argument> {
         let mut list = match kind {
-            RoutineKind::Rest => arguments(self.inputs, &[InputKind::Rest], "rest", ""),
+            RoutineKind::Rest => arguments(self.inputs, &[InputKind::Rest], "rest"),
             _ => self.point_arguments(),
         };
         if matches!(kind, RoutineKind::HessianVector | RoutineKind::Force | RoutineKind::Jacobians) {
@@ -234,12 +252,16 @@ impl Element<'_> {
         let mut body = self.read_arguments(&inputs, has_stored) + &self.call(kind, "energy_v");
         let is_full = matches!(kind, RoutineKind::Hessian | RoutineKind::GaussNewton);
         let is_skipped = |name: &str| name == "value" && is_full;
-        let points = self.plan.coordinates / 3;
+        let (points, is_flat) = (self.plan.coordinates / 3, self.is_flat());
         for (result, &(_, shape)) in function.results.iter().zip(groups(kind)) {
             if result.size == 0 || is_skipped(result.name) {
                 continue;
             }
-            let (of_type, number) = match shape {
+            if is_flat && is_full && result.name == "hessian" {
+                body.push_str(&self.flat_hessian(&mut arguments));
+                continue;
+            }
+            let (of_type, number) = match if is_flat { shape.flat() } else { shape } {
                 Shape::Vectors => (Type::Vector(3), "i / 3)[i % 3]"),
                 Shape::Blocks => (Type::Matrix(3, 3), "i / 9).data[i % 9 / 3][i % 3]"),
                 _ => (Type::Scalar, "i)"),
@@ -270,6 +292,15 @@ impl Element<'_> {
         }
     }
 
+    /// Adds the whole Hessian of mixed unknowns to the arguments. Returns the code that writes it.
+    fn flat_hessian(&self, arguments: &mut Vec<(String, String, String)>) -> String {
+        let n = self.plan.declaration.increments();
+        let annotation = Type::Scalar.annotation(self.dialect.precision);
+        let docs = format!("array of {}: the whole matrix, row by row", n * n);
+        arguments.push(("hessian".to_owned(), format!("wp.array(dtype={annotation})"), docs));
+        FLAT.replace("SIZE", &n.to_string())
+    }
+
     fn docs_of_arrays(&self, kind: RoutineKind) -> &'static str {
         match kind {
             RoutineKind::Rest => "Computes the numbers that the rest shape determines. Returns DEGENERATE, or 0.",
@@ -277,6 +308,11 @@ impl Element<'_> {
             RoutineKind::GaussNewton => "Computes the gradient of U and ks J^T J. Returns flags.",
             RoutineKind::Jacobians => "Computes the force and its derivatives. Returns flags.",
             RoutineKind::Jacobian => "Computes the residual and its Jacobian. Returns flags.",
+            RoutineKind::Next => "Computes the state after a step. Returns flags.",
+            RoutineKind::NextJacobians => "Computes the state after a step and its derivatives. Returns flags.",
+            RoutineKind::StateJacobian => {
+                "Computes the gradient, or the residual, and its derivatives by the state. Returns flags."
+            }
             _ => "Computes C and its derivatives. Returns flags.",
         }
     }
@@ -314,6 +350,16 @@ const EXPANDED: &str = r"for (int i = 0; i < POINTS; i++) {
         }
     }
 }";
+
+/// Writes the upper triangle of a symmetric matrix as a whole matrix.
+const FLAT: &str = r"for (int i = 0; i < SIZE; i++) {
+    for (int j = i; j < SIZE; j++) {
+        const auto energy_number = energy_hessian[i * SIZE - i * (i + 1) / 2 + j];
+        wp::index(hessian, i * SIZE + j) = energy_number;
+        wp::index(hessian, j * SIZE + i) = energy_number;
+    }
+}
+";
 
 /// Returns a text that can stand in a docstring.
 fn escaped(text: &str) -> String {

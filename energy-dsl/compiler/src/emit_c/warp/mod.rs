@@ -9,6 +9,7 @@ use std::fmt::Write as _;
 use super::dialect::{Dialect, Numbers, Precision};
 use super::element::Element;
 use super::expression::Meanings;
+use super::mixed::has_mixed_loops;
 use super::{SourceFile, folder, numbers};
 use crate::interpreted::Interpreted;
 use energy_runtime::RoutineKind;
@@ -17,6 +18,10 @@ use energy_runtime::RoutineKind;
 pub(super) fn module(elements: &[Interpreted], names: &[String], precisions: &[Precision]) -> SourceFile {
     let meanings = Meanings::default();
     let mut text = include_str!("module.py.in").to_owned();
+    if elements.iter().any(|element| has_mixed_loops(element.declaration())) {
+        let before = "Some derivatives are not known";
+        text = text.replacen(before, &format!("{}{before}", include_str!("mixed.txt.in")), 1);
+    }
     let (mut table, mut code) = (String::new(), String::new());
     for &precision in precisions {
         let _ =

@@ -8,11 +8,11 @@ use crate::syntax::canonical;
 
 /// Words that Python, C++, Warp or the generated code use.
 const RESERVED: &str = "alignas alignof and and_eq as asm assert async auto await bitand bitor blocks bool break \
-    by_position by_velocity \
+    by_position by_state by_unknowns by_velocity \
     case catch char class compl const constexpr continue decltype def default del delete do double elif else enum \
-    except explicit export extern finally float for force friend from global goto gradient hessians if import in \
+    except explicit export extern finally float for force friend from global goto gradient hessian hessians if import in \
     inline int is jacobian lambda long mutable namespace new noexcept nonlocal not not_eq nullptr operator or or_eq \
-    pass point private protected public raise register result ret return short signed sizeof static stored struct \
+    pass point private protected public raise register result ret return short signed sizeof state static stored struct \
     switch template this throw true try typedef typeid typename union unsigned using value virtual void volatile \
     while with wp xor xor_eq yield";
 
@@ -94,6 +94,13 @@ pub(super) struct Argument {
 }
 
 impl Argument {
+    /// Returns the argument as a vector of increments, which begins at `first`, under a name with a prefix.
+    pub(super) fn moved(&self, increments: usize, first: usize, array: &'static str, prefix: &str) -> Self {
+        let of_type = if increments == self.of_type.size() { self.of_type } else { Type::of_rows(increments) };
+        let name = format!("{prefix}{}", self.name);
+        Self { name, of_type, array, first, docs: format!("vector or velocity at {}", self.docs) }
+    }
+
     /// Writes a statement for each number, which gets the number and its place in the array.
     pub(super) fn each(&self, name: &str, statement: impl Fn(&str, &str) -> String) -> String {
         let first = self.first;
@@ -106,13 +113,8 @@ impl Argument {
     }
 }
 
-/// The arguments that are the inputs of some kinds; those with another array get `prefix` before their names.
-pub(super) fn arguments(
-    inputs: &[InputNumbers],
-    kinds: &[InputKind],
-    array: &'static str,
-    prefix: &str,
-) -> Vec<Argument> {
+/// The arguments that are the inputs of some kinds.
+pub(super) fn arguments(inputs: &[InputNumbers], kinds: &[InputKind], array: &'static str) -> Vec<Argument> {
     let mut all: Vec<(InputKind, String, Type, String)> = Vec::new();
     for input in inputs {
         let unit = if input.unit.is_empty() { String::new() } else { format!(" in {}", input.unit) };
@@ -137,7 +139,7 @@ pub(super) fn arguments(
     }
     let (mut list, mut first) = (Vec::new(), 0);
     for (_, name, of_type, docs) in all.into_iter().filter(|input| kinds.contains(&input.0)) {
-        list.push(Argument { name: format!("{prefix}{name}"), of_type, array, first, docs });
+        list.push(Argument { name, of_type, array, first, docs });
         first += of_type.size();
     }
     list
