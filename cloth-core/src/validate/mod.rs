@@ -32,7 +32,8 @@ mod strip;
 mod thinner;
 
 use energy_solve::{
-    CholeskyError, EvaluationError, ListError, MixedError, MixedNewtonError, MixedNewtonReport, SystemError,
+    CholeskyError, EvaluationError, ListError, MixedError, MixedNewtonError, MixedNewtonReport, SingularPivot,
+    SystemError,
 };
 
 pub use cantilever::Cantilever;
@@ -114,6 +115,9 @@ pub enum ValidateError {
     /// A search for an equilibrium of mixed unknowns failed.
     #[error(transparent)]
     MixedNewton(#[from] MixedNewtonError),
+    /// The Hessian of mixed unknowns cannot be factored.
+    #[error(transparent)]
+    Pivot(#[from] SingularPivot),
     /// A rod has no equilibrium that was found.
     #[error("no equilibrium of the rod after {} iterations: {:?}", .0.iterations, .0.stopped)]
     NoRest(MixedNewtonReport),
