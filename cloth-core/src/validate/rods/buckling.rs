@@ -154,7 +154,9 @@ fn middle_gives(loaded: &mut Loaded, torque: f64, segments: usize) -> Result<f64
     let spacing = 1.0 / segments as f64;
     let tilts: Vec<Vec<f64>> = [(1, 0), (segments, segments - 1)]
         .iter()
-        .flat_map(|&(to, from)| [1, 2].map(|axis| displacement(system, axis, &[(to, 1.0 / spacing), (from, -1.0 / spacing)])))
+        .flat_map(|&(to, from)| {
+            [1, 2].map(|axis| displacement(system, axis, &[(to, 1.0 / spacing), (from, -1.0 / spacing)]))
+        })
         .collect();
     let force = displacement(system, 1, &[(segments / 2, 1.0)]);
     let mut solve = |right: &[f64]| {
@@ -169,8 +171,7 @@ fn middle_gives(loaded: &mut Loaded, torque: f64, segments: usize) -> Result<f64
     let skew = [[0.0, -half, 0.0, 0.0], [half, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, half], [0.0, 0.0, -half, 0.0]];
     let times = |v: [f64; 4]| -> [f64; 4] { std::array::from_fn(|i| (0..4).map(|j| skew[i][j] * v[j]).sum()) };
     // K = S + U N Uᵀ with the tilts as columns of U: K⁻¹ f = S⁻¹ f − S⁻¹ U (1 + N Uᵀ S⁻¹ U)⁻¹ N Uᵀ S⁻¹ f.
-    let columns: [[f64; 4]; 4] =
-        std::array::from_fn(|j| times(std::array::from_fn(|i| inner(&tilts[i], &solved[j]))));
+    let columns: [[f64; 4]; 4] = std::array::from_fn(|j| times(std::array::from_fn(|i| inner(&tilts[i], &solved[j]))));
     let small = std::array::from_fn(|i| std::array::from_fn(|j| columns[j][i] + if i == j { 1.0 } else { 0.0 }));
     let part = solved_densely(small, times(std::array::from_fn(|i| inner(&tilts[i], &moved))));
     let corrections: f64 = (0..4).map(|i| part[i] * inner(&force, &solved[i])).sum();

@@ -17,20 +17,20 @@ pub(super) fn drift(segments: usize, steps: usize) -> Result<[f64; 2], ValidateE
     rod.stretching = 1e3;
     let loaded = rod.at_rest()?;
     let spacing = std::f64::consts::TAU / segments as f64;
-    let inertia: Vec<Inertia> = (0..2 * segments)
-        .map(|unknown| Inertia::Mass(spacing * if unknown % 2 == 0 { 1.0 } else { 0.01 }))
-        .collect();
+    let inertia: Vec<Inertia> =
+        (0..2 * segments).map(|unknown| Inertia::Mass(spacing * if unknown % 2 == 0 { 1.0 } else { 0.01 })).collect();
     let mut state = MixedState::at_rest(&loaded.system, loaded.u);
     for point in 0..segments {
         // A push out of the plane.
         let along = point as f64 * spacing;
-        state.rates[loaded.system.body().first_increment(2 * point) + 2] = 0.3 * (2.0 * along).sin() + 0.1 * along.cos();
+        state.rates[loaded.system.body().first_increment(2 * point) + 2] =
+            0.3 * (2.0 * along).sin() + 0.1 * along.cos();
     }
     let (scheme, options) = (MixedScheme::ImplicitMidpoint, MixedNewtonOptions::new(1e-9));
     let mut integrator = MixedIntegrator::new(loaded.system, inertia, scheme, &KindSolver::Automatic, options)?;
     let (mut furthest, mut most_writhe) = (put_in, 0.0_f64);
     for _ in 0..steps {
-        integrator.step(&mut state, 2e-3)?;
+        integrator.step(&mut state, 5e-3)?;
         let points: Vec<Vector> = (0..segments).map(|point| std::array::from_fn(|i| state.u[4 * point + i])).collect();
         // Two tangents and the twist between their frames are the state of each joint; only this term has one.
         let states = integrator.system().states().by_term.concat();
@@ -55,8 +55,9 @@ fn writhe(points: &[Vector]) -> f64 {
             if (j + 1) % count != i {
                 let [a, b] = [points[i], points[(i + 1) % count]];
                 let [c, d] = [points[j], points[(j + 1) % count]];
-                let corners = [(a, c), (a, d), (b, d), (b, c)].map(|(from, to)| unit(difference(to, from)));
-                area += solid_angle(corners[0], corners[1], corners[2]) + solid_angle(corners[0], corners[2], corners[3]);
+                let corners = [(a, c), (b, c), (b, d), (a, d)].map(|(from, to)| unit(difference(to, from)));
+                area +=
+                    solid_angle(corners[0], corners[1], corners[2]) + solid_angle(corners[0], corners[2], corners[3]);
             }
         }
     }

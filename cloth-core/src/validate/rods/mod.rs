@@ -47,7 +47,8 @@ impl Cases<'_> {
             let finding = if exact == 0.0 { Finding::absolute } else { Finding::relative };
             (self.report)(finding("rods", case.clone(), found, exact, limit));
             if let Some(before) = before {
-                let order = ((before[number] - exact) / (found - exact)).abs().ln() / (fine as f64 / coarse as f64).ln();
+                let order =
+                    ((before[number] - exact) / (found - exact)).abs().ln() / (fine as f64 / coarse as f64).ln();
                 let case = format!("{case}: order");
                 let error = (1.8 - order).max(0.0);
                 (self.report)(Finding { question: "rods", case, measured: order, exact: 2.0, error, limit: 0.0 });
@@ -79,7 +80,12 @@ fn bent(cases: &mut Cases<'_>) -> Result<(), ValidateError> {
     let torsion = [0.5, 1.5, 2.5].map(|turns| turns * std::f64::consts::PI);
     let [a, b, c] = vibration::BENDING;
     let exact = [a, b, c, torsion[0], torsion[1], torsion[2]];
-    cases.compare(names.map(|what| format!("clamped rod, frequency of {what}")), exact, [50, 100], &vibration::frequencies)
+    cases.compare(
+        names.map(|what| format!("clamped rod, frequency of {what}")),
+        exact,
+        [50, 100],
+        &vibration::frequencies,
+    )
 }
 
 fn buckled(cases: &mut Cases<'_>) -> Result<(), ValidateError> {

@@ -229,9 +229,8 @@ impl Rod {
 
     /// Returns moments about axes on edges, for [`Rod::at_rest_with`].
     pub(super) fn moments(&self, moments: &[(usize, f64, Vector)]) -> Result<MixedTerm, ValidateError> {
-        let element = |&(edge, moment, axis): &(usize, f64, Vector)| {
-            FactoredMoment::new(moment, axis, self.tangent(edge), 0.0)
-        };
+        let element =
+            |&(edge, moment, axis): &(usize, f64, Vector)| FactoredMoment::new(moment, axis, self.tangent(edge), 0.0);
         let stencil = |&(edge, ..): &(usize, f64, Vector)| [self.point(edge), self.point(edge + 1), 0];
         let stencils: Vec<[usize; 3]> = moments.iter().map(stencil).collect();
         Ok(MixedTerm::with_state("moments", moments.iter().map(element).collect(), &stencils)?)
@@ -246,7 +245,8 @@ impl Rod {
     pub(super) fn at_rest_with(&self, others: Vec<MixedTerm>) -> Result<Loaded, ValidateError> {
         let system = self.system(others)?;
         let spacing = distance(self.points[1], self.points[2]);
-        let options = MixedNewtonOptions::new(self.tolerance * spacing).with_stride(20.0 * spacing).with_iteration_limit(300);
+        let options =
+            MixedNewtonOptions::new(self.tolerance * spacing).with_stride(20.0 * spacing).with_iteration_limit(300);
         let newton = MixedNewton::new(&system, &KindSolver::Automatic, options);
         let mut u = Vec::with_capacity(system.body().numbers());
         for (number, point) in self.points.iter().enumerate() {
