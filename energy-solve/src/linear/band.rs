@@ -181,7 +181,8 @@ struct BadPivot {
     position: usize,
 }
 
-/// A ← L D Lᵀ, in panels of rows of the upper triangle. Without them, a row would wait for each pivot's row to be stored.
+/// A ← L D Lᵀ, in panels of rows of the upper triangle. Without them, a row would wait for each pivot's row to be
+/// stored.
 struct Elimination<'a> {
     rows: &'a mut [f64],
     count: usize,
@@ -226,8 +227,8 @@ impl Panel {
         Self { width, stride, sources, inverses: [0.0; TOGETHER] }
     }
 
-    /// Factors the first `pivots` rows, without the rows below. Returns the number of negative pivots, or the row of a bad
-    /// one as an error.
+    /// Factors the first `pivots` rows, without the rows below. Returns the number of negative pivots, or the row of a
+    /// bad one as an error.
     #[inline(always)]
     fn eliminate<L: Level>(&mut self, own: &mut [f64], pivots: usize) -> Result<usize, usize> {
         let Self { width, stride, sources, inverses } = self;

@@ -57,8 +57,8 @@ pub enum BorderedError {
 /// those of A must together be as many as there are maximised unknowns (Haynsworth 1968). A alone may be indefinite:
 /// then the solution is refined once.
 ///
-/// A multiplier of a constraint is a maximised unknown whose part of C is zero. Then A need not be definite, nor does its
-/// sum with the other terms: only where the constraint keeps its value.
+/// A multiplier of a constraint is a maximised unknown whose part of C is zero. Then A need not be definite, nor does
+/// its sum with the other terms: only where the constraint keeps its value.
 ///
 /// Conjugate gradients iterate on what is left once the maximised unknowns are eliminated, A − B C⁻¹ Bᵀ, bordered by
 /// the minimised unknowns.

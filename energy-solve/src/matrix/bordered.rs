@@ -110,7 +110,8 @@ impl BorderedMatrix {
         self.corner.fill(0.0);
     }
 
-    /// Returns the entries of C in the rows and columns that are concave or not as `rows` and `columns` say, row by row.
+    /// Returns the entries of C in the rows and columns that are concave or not as `rows` and `columns` say, row by
+    /// row.
     pub(crate) fn part_of_corner(&self, rows: bool, columns: bool) -> Vec<f64> {
         let chosen = |of: bool| (0..self.shared()).filter(move |&shared| self.is_concave(shared) == of);
         chosen(rows).flat_map(|row| chosen(columns).map(move |to| self.corner[row * self.shared() + to])).collect()

@@ -86,8 +86,8 @@ impl Problem<'_> {
         }
         Ok(self.energy(u)?)
     }
-    /// Returns the penalty of a step with these increments, along which the potential has this slope by all unknowns but
-    /// the maximised ones. Without multipliers it is 0.
+    /// Returns the penalty of a step with these increments, along which the potential has this slope by all unknowns
+    /// but the maximised ones. Without multipliers it is 0.
     pub(super) fn penalty(
         &mut self,
         u: &[f64],
@@ -137,8 +137,8 @@ impl Problem<'_> {
     }
 }
 
-/// A penalty for broken constraints c = 0, by which steps with multipliers p are compared: U − p c is the objective f, and
-/// f + Σ ν |c| has its minimum where f has one under the constraints, if ν > |p| (Han 1977).
+/// A penalty for broken constraints c = 0, by which steps with multipliers p are compared: U − p c is the objective f,
+/// and f + Σ ν |c| has its minimum where f has one under the constraints, if ν > |p| (Han 1977).
 pub(super) struct Penalty {
     /// ν of each constraint.
     weights: Vec<f64>,

@@ -17,7 +17,8 @@ pub(super) fn hanging_curl(weight: f64, curvature: f64, segments: usize) -> Resu
     Ok([x, -z])
 }
 
-/// Returns the displacement of the tip of Bathe and Bolourchi's bend: an eighth of a circle, with a load across its plane.
+/// Returns the displacement of the tip of Bathe and Bolourchi's bend: an eighth of a circle, with a load across its
+/// plane.
 pub(super) fn bent_cantilever(segments: usize) -> Result<Vector, ValidateError> {
     const RADIUS: f64 = 100.0;
     let modulus: f64 = 1e7;

@@ -121,12 +121,12 @@ energy! {
     energy Torque(θ: Scalar[rad], shared s: Scalar[1]; M: Scalar[N m]) { -s * M * θ }
 }
 
-/// Returns M²/4B² + P/B, times L²/π², at which a strut with a compression P and a torque M on its ends buckles. They may
-/// turn, and the torque keeps its axis (Greenhill 1883). P is given in units of π² B/L².
+/// Returns M²/4B² + P/B, times L²/π², at which a strut with a compression P and a torque M on its ends buckles. They
+/// may turn, and the torque keeps its axis (Greenhill 1883). P is given in units of π² B/L².
 ///
 /// Such a torque has no potential. That of the angle of twist has the moment M (e + t)/(1 + e·t), halfway between the
-/// axis e and the tangent t. The rest, ½ M (e − t), adds a skew part to the Hessian, of rank 4: it belongs to the tilts of
-/// both end edges. So the stiffness against a force on the middle decides, by the formula of Sherman, Morrison and
+/// axis e and the tangent t. The rest, ½ M (e − t), adds a skew part to the Hessian, of rank 4: it belongs to the tilts
+/// of both end edges. So the stiffness against a force on the middle decides, by the formula of Sherman, Morrison and
 /// Woodbury.
 pub(super) fn twisted_strut(compression: f64, segments: usize) -> Result<f64, ValidateError> {
     let squared = std::f64::consts::PI * std::f64::consts::PI;

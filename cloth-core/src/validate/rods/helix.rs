@@ -4,7 +4,8 @@
 use super::ValidateError;
 use super::rod::{Ends, Loaded, Rod, Vector, difference, unit};
 
-/// Finds the equilibrium of a rod through points whose first and last edges are fixed. It is evenly twisted at the start.
+/// Finds the equilibrium of a rod through points whose first and last edges are fixed. It is evenly twisted at the
+/// start.
 fn settled(mut rod: Rod, twist: f64, spacing: f64) -> Result<Loaded, ValidateError> {
     // Frames of reference that follow the first points have no twist.
     rod.twists = (0..rod.edges()).map(|edge| twist * edge as f64 * spacing).collect();
@@ -56,9 +57,9 @@ const TENSION: f64 = 2_900.993_205_792_131;
 
 /// Returns m, t and the largest angle between tangent and axis.
 ///
-/// With the Euler angles φ and ψ of the tangent, moments about the axis and the tangent are M, so that ψ′ = M/(B (1 + cos
-/// φ)), and the energy integral gives v′² = v² (4T/B − M²/B² − 2 T v/B) for v = 1 − cos φ. So v = v₀ sech²(√(t − m²/4)
-/// s/L) with v₀ = 2 − m²/2t. The slack ∫ v ds and the turn M L/C + 4 arccos(m/2√t) are those of the ends.
+/// With the Euler angles φ and ψ of the tangent, moments about the axis and the tangent are M, so that ψ′ = M/(B (1 +
+/// cos φ)), and the energy integral gives v′² = v² (4T/B − M²/B² − 2 T v/B) for v = 1 − cos φ. So v = v₀ sech²(√(t −
+/// m²/4) s/L) with v₀ = 2 − m²/2t. The slack ∫ v ds and the turn M L/C + 4 arccos(m/2√t) are those of the ends.
 pub(super) fn localised(segments: usize) -> Result<[f64; 3], ValidateError> {
     let spacing = LONG / segments as f64;
     let mut points = vec![[0.0; 3]];

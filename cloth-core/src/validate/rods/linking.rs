@@ -5,11 +5,11 @@ use energy_solve::{Inertia, KindSolver, MixedIntegrator, MixedNewtonOptions, Mix
 use super::ValidateError;
 use super::rod::{Ends, Rod, Vector, cross, difference, dot, ring, unit};
 
-/// Returns Tw + Wr of a closed rod with a linking number of 2 after each of some steps, at its furthest from 2, and how far
-/// the writhe changed.
+/// Returns Tw + Wr of a closed rod with a linking number of 2 after each of some steps, at its furthest from 2, and how
+/// far the writhe changed.
 ///
-/// The twist is the sum of what the states of `RodTwist` have, as the angles of a closed rod cancel. Of closed polygons, Tw
-/// + Wr is a whole number (Călugăreanu 1961), or here the number that was put in.
+/// The twist is the sum of what the states of `RodTwist` have, as the angles of a closed rod cancel. Of closed
+/// polygons, Tw + Wr is a whole number (Călugăreanu 1961), or here the number that was put in.
 pub(super) fn drift(segments: usize, steps: usize) -> Result<[f64; 2], ValidateError> {
     let put_in = 2.0;
     let points = ring(segments);
@@ -44,8 +44,8 @@ pub(super) fn drift(segments: usize, steps: usize) -> Result<[f64; 2], ValidateE
     Ok([furthest, most_writhe])
 }
 
-/// Returns the writhe of a closed polygon: the mean over all views of the signs of its crossings. Two edges cross in the
-/// views that a quadrilateral on the unit sphere contains (Klenin and Langowski 2000).
+/// Returns the writhe of a closed polygon: the mean over all views of the signs of its crossings. Two edges cross in
+/// the views that a quadrilateral on the unit sphere contains (Klenin and Langowski 2000).
 fn writhe(points: &[Vector]) -> f64 {
     let count = points.len();
     let mut area = 0.0;

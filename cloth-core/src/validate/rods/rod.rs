@@ -41,7 +41,8 @@ pub(super) struct Rod {
 pub(super) enum Ends {
     /// The first edge is fixed, and the rod begins at its end: only half of the joint there bends.
     Clamped,
-    /// The first edge and the last one are fixed, and the rod reaches from the middle of one to the middle of the other.
+    /// The first edge and the last one are fixed, and the rod reaches from the middle of one to the middle of the
+    /// other.
     BothHeld,
     /// The first and the last point are fixed and may turn, but not about the rod.
     Hinged,
@@ -68,7 +69,11 @@ energy! {
     energy FactoredLoad(x: Point, shared s: Scalar[1]; f: Vec3[N]) { -s * dot(f, x) }
 
     /// A moment s M about an axis n on an edge; s is the load factor. The state counts turns.
-    energy FactoredMoment(x0, x1: Point, shared s: Scalar[1]; state t: Vec3[1], a: Scalar[rad]; M: Scalar[N m], n: Vec3[1]) {
+    energy FactoredMoment(
+        x0, x1: Point, shared s: Scalar[1];
+        state t: Vec3[1], a: Scalar[rad];
+        M: Scalar[N m], n: Vec3[1]
+    ) {
         let e = x1 - x0;
         let turned = a + atan2(dot(n, cross(t, e)), dot(t, e));
         next { t = unit(e); a = turned; }

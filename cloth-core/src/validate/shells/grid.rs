@@ -1,4 +1,5 @@
-//! A rectangle of triangles with stretch and bending: points, tilts of the normals at edges, and ghosts beyond the border.
+//! A rectangle of triangles with stretch and bending: points, tilts of the normals at edges, and ghosts beyond the
+//! border.
 
 use std::collections::BTreeMap;
 

@@ -17,8 +17,8 @@ pub(super) fn deflection(clamped: bool, cells: usize) -> Result<f64, ValidateErr
     Ok(points[grid.point(cells / 2, cells / 2)][2] / load)
 }
 
-/// Returns how far the free edge of the roof of Scordelis and Lo sinks in its middle (MacNeal and Harder 1985): an arc of
-/// 80° of a cylinder, on walls at both ends that hold their plane.
+/// Returns how far the free edge of the roof of Scordelis and Lo sinks in its middle (MacNeal and Harder 1985): an arc
+/// of 80° of a cylinder, on walls at both ends that hold their plane.
 pub(super) fn roof(cells: usize) -> Result<f64, ValidateError> {
     const RADIUS: f64 = 25.0;
     const LENGTH: f64 = 50.0;

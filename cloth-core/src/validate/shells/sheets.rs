@@ -3,8 +3,8 @@
 use super::grid::{Grid, Material, Support, Vector, cross, difference, dot};
 use crate::validate::ValidateError;
 
-/// Returns the curvature in the middle of a free sheet of length 1, over κ₀. A narrow one bends by κ₀ along and across. A
-/// wide one cannot, as its area would stretch: it rolls up by (1 + ν) κ₀.
+/// Returns the curvature in the middle of a free sheet of length 1, over κ₀. A narrow one bends by κ₀ along and across.
+/// A wide one cannot, as its area would stretch: it rolls up by (1 + ν) κ₀.
 pub(super) fn curvature(width: f64, cells: [usize; 2]) -> Result<f64, ValidateError> {
     let (ν, natural): (f64, f64) = (0.3, 0.5);
     let thickness = 2e-3_f64;
@@ -16,17 +16,8 @@ pub(super) fn curvature(width: f64, cells: [usize; 2]) -> Result<f64, ValidateEr
     let fixed = vec![grid.point(i, j), grid.point(i + 1, j), grid.point(i, j + 1)];
     let support = Support { fixed, curvature: natural, ..Support::default() };
     // Rolled up at the start: a square has two ways to do so.
-    let start: Vec<Vector> =
-        grid.rest.iter().map(|&[x, y, _]| rolled(x - grid.rest[grid.point(i, j)][0], y, natural)).collect();
-    let middle = start[grid.point(i, j)];
-    let start: Vec<Vector> = start
-        .iter()
-        .map(|&x| {
-            let [dx, dy, dz] = difference(x, middle);
-            let at = grid.rest[grid.point(i, j)];
-            [at[0] + dx, at[1] + dy, at[2] + dz]
-        })
-        .collect();
+    let middle = grid.rest[grid.point(i, j)][0];
+    let start: Vec<Vector> = grid.rest.iter().map(|&[x, y, _]| rolled([x, y], middle, natural)).collect();
     let (points, report) = grid.settle(material, &support, &start)?;
     if !report.converged() {
         return Err(ValidateError::NoRest(report));
@@ -35,14 +26,14 @@ pub(super) fn curvature(width: f64, cells: [usize; 2]) -> Result<f64, ValidateEr
     Ok(circle_curvature(a, b, c) / natural)
 }
 
-/// Returns a point of a sheet that is rolled up along x.
-fn rolled(x: f64, y: f64, curvature: f64) -> Vector {
-    let angle = curvature * x;
-    [angle.sin() / curvature, y, -(1.0 - angle.cos()) / curvature]
+/// Returns a point of a sheet that is rolled up along x. The line at `middle` stays where it is.
+fn rolled([x, y]: [f64; 2], middle: f64, curvature: f64) -> Vector {
+    let (sine, cosine) = (curvature * (x - middle)).sin_cos();
+    [middle + sine / curvature, y, -(1.0 - cosine) / curvature]
 }
 
-/// Returns the curvature of the circle through three points: four times the area of their triangle over the product of its
-/// sides.
+/// Returns the curvature of the circle through three points: four times the area of their triangle over the product of
+/// its sides.
 fn circle_curvature(a: Vector, b: Vector, c: Vector) -> f64 {
     let sides = [difference(b, a), difference(c, b), difference(a, c)];
     let normal = cross(sides[0], sides[1]);
