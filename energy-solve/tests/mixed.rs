@@ -1,9 +1,10 @@
 //! Sums, equilibria and motions of bodies with unknowns that are not only points.
 
 use energy_solve::{
-    BandOrder, BorderedMatrix, Curvature, ElementList, Extremum, Inertia, KindSolver, LinearisationOptions, MixedBody,
-    MixedError, MixedIntegrator, MixedNewton, MixedNewtonError, MixedNewtonOptions, MixedScheme, MixedState, MixedStop,
-    MixedSystem, MixedTerm, PotentialTerm, SolveOptions, State, System, UnknownKind, Weights,
+    BandOrder, BorderedError, BorderedMatrix, Curvature, ElementList, Extremum, Inertia, KindSolver,
+    LinearisationOptions, MixedBody, MixedError, MixedIntegrator, MixedNewton, MixedNewtonError, MixedNewtonOptions,
+    MixedScheme, MixedState, MixedStop, MixedSystem, MixedTerm, PotentialTerm, SolveOptions, State, System,
+    UnknownKind, Weights,
 };
 use nalgebra::{DMatrix, DVector};
 
@@ -210,7 +211,7 @@ fn a_maximised_unknown_may_make_an_indefinite_matrix_definite() {
     matrix.corner_mut()[0] = 1.0;
     for solver in [BAND, gradients()] {
         let outcome = energy_solve::BorderedSolver::new(&pattern, &solver).solve(&matrix, &[1.0; 2], &mut [0.0; 2]);
-        assert_eq!(outcome, Err(energy_solve::BorderedError::NotConcave));
+        assert_eq!(outcome, Err(BorderedError::NotConcave));
     }
 }
 
@@ -351,11 +352,13 @@ fn a_shared_unknown_is_the_best_parameter() {
     }
 }
 
-/// An octahedron of springs, of which one corner and two coordinates of another are held by springs to fixed points.
+/// An octahedron of springs, whose corners are held by springs to fixed points. Without compliance, its pressure is a
+/// multiplier.
 fn balloon(compliance: f64, prescribed: bool) -> (MixedSystem, Vec<f64>) {
     let corners: [[f64; 3]; 6] =
         [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, -1.0]];
-    let mut body = MixedBody::new(&[VECTOR; 12], 1.0).with_shared(SCALAR, Extremum::Maximum, 0.0);
+    let extremum = if compliance == 0.0 { Extremum::Multiplier } else { Extremum::Maximum };
+    let mut body = MixedBody::new(&[VECTOR; 12], 1.0).with_shared(SCALAR, extremum, 0.0);
     body = body.with_fixed(&[6, 7, 8, 9, 10, 11]).unwrap();
     if prescribed {
         body = body.with_fixed_shared(&[0]).unwrap();
@@ -417,6 +420,27 @@ fn a_pressure_enforces_a_volume() {
             assert!(largest < 1e-7, "{largest:e}");
         }
     }
+}
+
+#[test]
+fn a_multiplier_enforces_a_volume_without_compliance() {
+    let find = |compliance: f64, size: f64, solver: &KindSolver| {
+        let (mut system, mut start) = balloon(compliance, false);
+        start[..18].iter_mut().for_each(|x| *x *= size);
+        MixedNewton::new(&system, solver, MixedNewtonOptions::new(1e-10)).minimise(&mut system, &start)
+    };
+    let (expected, report) = find(1e-6, 1.0, &BAND).unwrap();
+    assert!(report.converged(), "{report:?}");
+    // Also from far away, where the volume is a tenth of that.
+    for size in [1.0, 0.5, 2.0] {
+        let (u, report) = find(0.0, size, &BAND).unwrap();
+        assert!(report.converged(), "{size}: {report:?}");
+        assert!((volume(&u) - 3.0).abs() < 1e-12, "{size}: {}", volume(&u));
+        let furthest = u.iter().zip(&expected).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        assert!(furthest < 1e-5, "{size}: {furthest:e}");
+    }
+    let refused = find(0.0, 1.0, &gradients());
+    assert!(matches!(refused, Err(MixedNewtonError::Linear(BorderedError::Multiplier))), "{refused:?}");
 }
 
 #[test]

@@ -4,6 +4,7 @@
 //! are simulated.
 
 mod balloon;
+mod bodies;
 mod cantilever;
 mod capstan;
 mod catenary;
@@ -25,6 +26,7 @@ mod modes;
 mod momentum;
 mod orders;
 mod rods;
+mod shells;
 mod special;
 mod stack;
 mod stick_slip;
@@ -32,7 +34,8 @@ mod strip;
 mod thinner;
 
 use energy_solve::{
-    CholeskyError, EvaluationError, ListError, MixedError, MixedNewtonError, MixedNewtonReport, SystemError,
+    CholeskyError, EvaluationError, ListError, MixedError, MixedNewtonError, MixedNewtonReport, SingularPivot,
+    SystemError,
 };
 
 pub use cantilever::Cantilever;
@@ -114,8 +117,14 @@ pub enum ValidateError {
     /// A search for an equilibrium of mixed unknowns failed.
     #[error(transparent)]
     MixedNewton(#[from] MixedNewtonError),
-    /// A rod has no equilibrium that was found.
-    #[error("no equilibrium of the rod after {} iterations: {:?}", .0.iterations, .0.stopped)]
+    /// The Hessian of mixed unknowns cannot be factored.
+    #[error(transparent)]
+    Pivot(#[from] SingularPivot),
+    /// The rest shape of an element is degenerate.
+    #[error(transparent)]
+    Rest(#[from] energy_dsl::RestError),
+    /// A rod or a shell has no equilibrium that was found.
+    #[error("no equilibrium after {} iterations: {:?}", .0.iterations, .0.stopped)]
     NoRest(MixedNewtonReport),
     /// A scene is invalid.
     #[error(transparent)]
@@ -151,13 +160,15 @@ pub enum ValidateError {
 }
 
 /// Names of the questions.
-pub const QUESTIONS: [&str; 11] = [
+pub const QUESTIONS: [&str; 13] = [
     "cantilever",
     "buckling",
     "catenary",
     "hanging-strip",
     "modes",
     "rods",
+    "bodies",
+    "shells",
     "orders",
     "momentum",
     "contact",
@@ -172,13 +183,15 @@ pub const QUESTIONS: [&str; 11] = [
 /// Returns an error if a case cannot be set up or solved.
 pub fn ask(names: &[String], quick: bool, mut report: impl FnMut(&Finding)) -> Result<Vec<Finding>, ValidateError> {
     type Ask = fn(bool, &mut dyn FnMut(Finding)) -> Result<(), ValidateError>;
-    let all: [Ask; 11] = [
+    let all: [Ask; 13] = [
         cantilever::ask,
         lateral_buckling::ask,
         catenary::ask,
         hanging_strip::ask,
         modes::ask,
         rods::ask,
+        bodies::ask,
+        shells::ask,
         orders::ask,
         momentum::ask,
         contact::ask,

@@ -38,6 +38,9 @@ pub enum BorderedError {
     /// The block of the maximised unknowns is not negative definite.
     #[error("the potential is not concave in the shared unknowns that are maximised")]
     NotConcave,
+    /// Conjugate gradients cannot eliminate a multiplier.
+    #[error("a multiplier of a constraint needs a banded factorisation: KindSolver::Band")]
+    Multiplier,
     /// Conjugate gradients did not converge.
     #[error("conjugate gradients stopped after {iterations} iterations: {stopped}")]
     NotConverged {
@@ -53,6 +56,9 @@ pub enum BorderedError {
 /// With a banded factorisation of A, x follows from the Schur complement S = C − Bᵀ A⁻¹ B. Its negative eigenvalues and
 /// those of A must together be as many as there are maximised unknowns (Haynsworth 1968). A alone may be indefinite:
 /// then the solution is refined once.
+///
+/// A multiplier of a constraint is a maximised unknown whose part of C is zero. Then A need not be definite, nor does
+/// its sum with the other terms: only where the constraint keeps its value.
 ///
 /// Conjugate gradients iterate on what is left once the maximised unknowns are eliminated, A − B C⁻¹ Bᵀ, bordered by
 /// the minimised unknowns.
@@ -139,7 +145,8 @@ impl Band {
     }
 
     fn factor(&mut self, matrix: &BorderedMatrix) -> Result<(), BorderedError> {
-        let maximised = concave(matrix)?.1;
+        concave(matrix)?;
+        let maximised = matrix.maximised.iter().filter(|is| **is).count();
         let negative = self.factor.factor(&matrix.kinds)?;
         self.is_indefinite = negative > 0;
         let (n, shared) = (matrix.kinds.pattern().increments(), matrix.shared());
@@ -166,12 +173,12 @@ impl Band {
     }
 }
 
-/// Returns the factors of the maximised unknowns' block of C, and their number.
+/// Returns the factors of the block of C of the maximised unknowns that are not multipliers, and their number.
 ///
 /// # Errors
 /// If the block is not negative definite.
 pub(crate) fn concave(matrix: &BorderedMatrix) -> Result<(DenseFactor, usize), BorderedError> {
-    let maximised = matrix.maximised.iter().filter(|is| **is).count();
+    let maximised = (0..matrix.shared()).filter(|&shared| matrix.is_concave(shared)).count();
     let block = matrix.part_of_corner(true, true);
     let factor = DenseFactor::new(block, maximised).map_err(|_| BorderedError::NotConcave)?;
     if factor.negative() == maximised { Ok((factor, maximised)) } else { Err(BorderedError::NotConcave) }

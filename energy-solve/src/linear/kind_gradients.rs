@@ -51,6 +51,9 @@ struct Reduced<'a> {
 
 impl<'a> Reduced<'a> {
     fn new(matrix: &'a BorderedMatrix) -> Result<Self, BorderedError> {
+        if matrix.multipliers.contains(&true) {
+            return Err(BorderedError::Multiplier);
+        }
         let (concave, _) = concave(matrix)?;
         let chosen = |of: bool| (0..matrix.shared()).filter(|&shared| matrix.maximised[shared] == of).collect();
         let n = matrix.kinds.pattern().increments();

@@ -21,6 +21,8 @@ pub struct BorderedMatrix {
     pub(crate) corner: Vec<f64>,
     /// Whether each shared increment is maximised.
     pub(crate) maximised: Vec<bool>,
+    /// Whether each of them is a multiplier: the potential is linear in it.
+    pub(crate) multipliers: Vec<bool>,
 }
 
 impl BorderedMatrix {
@@ -34,7 +36,24 @@ impl BorderedMatrix {
             border: vec![0.0; shared * pattern.increments()],
             corner: vec![0.0; shared * shared],
             maximised: maximised.to_vec(),
+            multipliers: vec![false; shared],
         }
+    }
+
+    /// Marks maximised unknowns that are multipliers of constraints: their part of C is zero, and the matrix must be
+    /// positive definite where the constraints keep their values.
+    ///
+    /// # Panics
+    /// If there is not one entry per shared increment.
+    #[must_use]
+    pub fn with_multipliers(self, multipliers: &[bool]) -> Self {
+        assert_eq!(multipliers.len(), self.shared(), "one entry per shared increment");
+        Self { multipliers: multipliers.to_vec(), ..self }
+    }
+
+    /// Whether the potential is strictly concave in a shared increment.
+    pub(crate) fn is_concave(&self, shared: usize) -> bool {
+        self.maximised[shared] && !self.multipliers[shared]
     }
 
     /// Returns A.
@@ -91,9 +110,10 @@ impl BorderedMatrix {
         self.corner.fill(0.0);
     }
 
-    /// Returns the entries of C in the rows and columns whose `maximised` is `rows` and `columns`, row by row.
+    /// Returns the entries of C in the rows and columns that are concave or not as `rows` and `columns` say, row by
+    /// row.
     pub(crate) fn part_of_corner(&self, rows: bool, columns: bool) -> Vec<f64> {
-        let chosen = |of: bool| (0..self.shared()).filter(move |&shared| self.maximised[shared] == of);
+        let chosen = |of: bool| (0..self.shared()).filter(move |&shared| self.is_concave(shared) == of);
         chosen(rows).flat_map(|row| chosen(columns).map(move |to| self.corner[row * self.shared() + to])).collect()
     }
 

@@ -58,6 +58,9 @@ pub enum Extremum {
     /// A maximum: the potential is strictly concave in the unknown. So is the potential of a pressure that enforces a
     /// volume with some compliance, −p (V − V₀) − ½ κ p².
     Maximum,
+    /// Neither: the potential is linear in the unknown, the multiplier of a constraint, such as a pressure that
+    /// enforces a volume, −p (V − V₀). The others are at a minimum under the constraint. Needs a banded factorisation.
+    Multiplier,
 }
 
 /// The unknowns of a body: those that elements have of their own, in order, and those that all elements share.

@@ -61,17 +61,22 @@ fn is_inertia(tensor: &Block<f64>) -> bool {
 #[derive(Debug)]
 pub(super) struct InertialPotential {
     time: f64,
+    /// The mass of each flat unknown that has one.
+    masses: Vec<(u32, f64)>,
+    /// Their numbers.
     flat: Vec<Flat>,
     turning: Vec<Turning>,
 }
 
-/// Where free motion leads a flat unknown.
+/// Where free motion leads a number of a flat unknown.
 #[derive(Clone, Copy, Debug)]
 struct Flat {
-    unknown: u32,
-    size: u32,
     mass: f64,
-    at: Vector3<f64>,
+    at: f64,
+    /// Its position in configurations.
+    number: u32,
+    /// Its position in gradients.
+    increment: u32,
 }
 
 /// Where free motion leads a rotation, and the inertia tensor in space there.
@@ -92,16 +97,20 @@ impl InertialPotential {
         time: f64,
         reference: f64,
     ) -> Self {
-        let (mut flat, mut turning) = (Vec::new(), Vec::new());
+        let (mut masses, mut flat, mut turning) = (Vec::new(), Vec::new(), Vec::new());
         let free = body.all().iter().zip(inertia).enumerate().filter(|(_, (unknown, _))| !unknown.fixed);
         for (number, (unknown, inertia)) in free {
             let (u, rates) = (&u[unknown.number..], &rates[unknown.increment..]);
             match *inertia {
                 Inertia::None => {}
                 Inertia::Mass(mass) => {
-                    let size = unknown.kind.increments();
-                    let at = std::array::from_fn(|i| if i < size { u[i] + time * rates[i] } else { 0.0 });
-                    flat.push(Flat { unknown: index(number), size: size as u32, mass, at });
+                    masses.push((index(number), mass));
+                    flat.extend((0..unknown.kind.increments()).map(|i| Flat {
+                        mass,
+                        at: u[i] + time * rates[i],
+                        number: index(unknown.number + i),
+                        increment: index(unknown.increment + i),
+                    }));
                 }
                 Inertia::Tensor(tensor) => {
                     let (q, rate) = (std::array::from_fn(|i| u[i]), std::array::from_fn(|i| rates[i]));
@@ -110,16 +119,17 @@ impl InertialPotential {
                 }
             }
         }
-        Self { time, flat, turning }
+        Self { time, masses, flat, turning }
     }
 
     /// Returns the energy.
     pub(super) fn energy(&self, body: &MixedBody, u: &[f64]) -> MixedEnergy {
         let mut sum = EnergySum::default();
         let squared = self.time * self.time;
+        let factor = 0.5 / squared;
         for flat in &self.flat {
-            let moved = flat.difference(body, u);
-            sum.add(0.5 * flat.mass * dot(moved, moved) / squared);
+            let moved = flat.moved(u);
+            sum.add(factor * flat.mass * moved * moved);
         }
         for Turning { unknown, tensor, at } in &self.turning {
             let (_, v) = difference(&u[body.first_number(*unknown)..], *at);
@@ -131,10 +141,9 @@ impl InertialPotential {
     /// Adds the gradient.
     pub(super) fn add_gradient(&self, body: &MixedBody, u: &[f64], gradient: &mut [f64]) {
         let squared = self.time * self.time;
+        let factor = 1.0 / squared;
         for flat in &self.flat {
-            let (moved, first) = (flat.difference(body, u), body.first_increment(flat.unknown as usize));
-            let own = &mut gradient[first..][..flat.size as usize];
-            own.iter_mut().zip(moved).for_each(|(sum, moved)| *sum += flat.mass * moved / squared);
+            gradient[flat.increment as usize] += factor * flat.mass * flat.moved(u);
         }
         for Turning { unknown, tensor, at } in &self.turning {
             let (w, v) = difference(&u[body.first_number(*unknown)..], *at);
@@ -157,8 +166,8 @@ impl InertialPotential {
     ) {
         let squared = self.time * self.time;
         let row = |unknown: usize| rows.of[unknown].expect("a fixed unknown has no prediction") as usize;
-        for flat in &self.flat {
-            let (row, entry) = (row(flat.unknown as usize), flat.mass / squared);
+        for &(unknown, mass) in &self.masses {
+            let (row, entry) = (row(unknown as usize), mass / squared);
             matrix.kinds.add(row, row, |i, j| if i == j { entry } else { 0.0 });
         }
         for Turning { unknown, tensor, at } in &self.turning {
@@ -190,8 +199,8 @@ impl InertialPotential {
         self.add_gradient(body, minimum, &mut impulse);
         impulse.iter_mut().for_each(|entry| *entry *= time);
         for flat in self.flat.iter().filter(|flat| flat.mass > 0.0) {
-            let first = body.first_increment(flat.unknown as usize);
-            (first..first + flat.size as usize).for_each(|i| after[i] = rates[i] + impulse[i] / flat.mass);
+            let i = flat.increment as usize;
+            after[i] = rates[i] + impulse[i] / flat.mass;
         }
         for &Turning { unknown, .. } in &self.turning {
             let (number, first) = (body.first_number(unknown), body.first_increment(unknown));
@@ -208,12 +217,9 @@ impl InertialPotential {
 }
 
 impl Flat {
-    /// Returns x − x̃, padded with zeros.
-    fn difference(&self, body: &MixedBody, u: &[f64]) -> Vector3<f64> {
-        let own = &u[body.first_number(self.unknown as usize)..][..self.size as usize];
-        let mut difference = [0.0; 3];
-        difference.iter_mut().zip(own).zip(self.at).for_each(|((difference, x), at)| *difference = x - at);
-        difference
+    /// Returns x − x̃.
+    fn moved(&self, u: &[f64]) -> f64 {
+        u[self.number as usize] - self.at
     }
 }
 

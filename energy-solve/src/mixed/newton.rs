@@ -125,7 +125,8 @@ const ROUNDING: f64 = 1e-14;
 /// times more after each step that was far too long, as projected Hessians may be singular.
 ///
 /// Shared unknowns that are [maximised](super::Extremum::Maximum) are eliminated: steps minimise the potential
-/// maximised over them.
+/// maximised over them. With [multipliers](super::Extremum::Multiplier), steps lower the potential without them plus a
+/// penalty for broken constraints.
 ///
 /// ```
 /// use energy_elements::{Gravity, HookeSpring};
@@ -330,6 +331,8 @@ impl MixedNewton {
         report: &mut MixedNewtonReport,
     ) -> Result<Option<(Vec<f64>, MixedEnergy)>, MixedNewtonError> {
         let before = report.energy;
+        let penalty = problem.penalty(u, (&direction.increments, direction.slope), &mut self.matrix)?;
+        let merit = before.value + problem.penalised(u, &penalty, &mut self.matrix)?;
         let mut scale = self.first_scale(problem.system.body(), direction, report.last_move);
         for halvings in 0..MOST_HALVINGS {
             let mut moved = problem.system.body().moved(u, scale, &direction.increments);
@@ -340,8 +343,10 @@ impl MixedNewton {
                 }
                 energy => energy?,
             };
+            let added =
+                if energy.value.is_finite() { problem.penalised(&moved, &penalty, &mut self.matrix)? } else { 0.0 };
             let slack = ROUNDING * before.magnitude.max(if energy.value.is_finite() { energy.magnitude } else { 0.0 });
-            if energy.value <= before.value + SUFFICIENT * scale * direction.slope + slack {
+            if energy.value + added <= merit + SUFFICIENT * scale * penalty.slope + slack {
                 report.halvings += halvings;
                 return Ok(Some((moved, energy)));
             }

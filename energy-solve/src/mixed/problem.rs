@@ -1,5 +1,6 @@
 //! The function that Newton's method minimises.
 
+use super::body::Unknown;
 use super::error::MixedError;
 use super::inertia::InertialPotential;
 use super::newton::MixedNewtonError;
@@ -50,7 +51,7 @@ impl Problem<'_> {
         u: &mut Vec<f64>,
         matrix: &mut BorderedMatrix,
     ) -> Result<MixedEnergy, MixedNewtonError> {
-        if !matrix.maximised.iter().any(|is| *is) {
+        if !(0..matrix.shared()).any(|shared| matrix.is_concave(shared)) {
             return Ok(self.energy(u)?);
         }
         let own = self.system.pattern().increments();
@@ -69,7 +70,7 @@ impl Problem<'_> {
                 break;
             }
             let gradient = self.system.free_part(&gradient);
-            let rows = || (0..matrix.shared()).filter(|&shared| matrix.maximised[shared]);
+            let rows = || (0..matrix.shared()).filter(|&shared| matrix.is_concave(shared));
             let mut direction: Vec<f64> = rows().map(|shared| -gradient[own + shared]).collect();
             concave(matrix)?.0.solve(&mut direction);
             let rise: f64 = rows().zip(&direction).map(|(shared, d)| gradient[own + shared] * d).sum();
@@ -85,4 +86,62 @@ impl Problem<'_> {
         }
         Ok(self.energy(u)?)
     }
+    /// Returns the penalty of a step with these increments, along which the potential has this slope by all unknowns
+    /// but the maximised ones. Without multipliers it is 0.
+    pub(super) fn penalty(
+        &mut self,
+        u: &[f64],
+        (increments, slope): (&[f64], f64),
+        matrix: &mut BorderedMatrix,
+    ) -> Result<Penalty, MixedError> {
+        if !matrix.multipliers.contains(&true) {
+            return Ok(Penalty { weights: Vec::new(), slope });
+        }
+        let constraints = self.constraints(u, matrix)?;
+        let own = self.system.pattern().increments();
+        let moves = &self.system.free_part(increments)[own..];
+        let of_objective = slope + constraints.iter().map(|(_, p, c)| p * c).sum::<f64>();
+        let broken: f64 = constraints.iter().map(|(.., c)| c.abs()).sum();
+        // Weights above the multipliers make the penalty exact; uphill directions need more.
+        let more = if broken > 0.0 && of_objective > 0.0 { 2.0 * of_objective / broken } else { 0.0 };
+        let weights: Vec<f64> = constraints.iter().map(|&(row, p, _)| more + 2.0 * (p + moves[row]).abs()).collect();
+        let slope =
+            of_objective - weights.iter().zip(&constraints).map(|(weight, (.., c))| weight * c.abs()).sum::<f64>();
+        Ok(Penalty { weights, slope })
+    }
+
+    /// Returns what a penalty adds to the potential: Σ ν |c| − p c.
+    pub(super) fn penalised(
+        &mut self,
+        u: &[f64],
+        penalty: &Penalty,
+        matrix: &mut BorderedMatrix,
+    ) -> Result<f64, MixedError> {
+        if penalty.weights.is_empty() {
+            return Ok(0.0);
+        }
+        let constraints = self.constraints(u, matrix)?;
+        Ok(penalty.weights.iter().zip(constraints).map(|(weight, (_, p, c))| weight * c.abs() - p * c).sum())
+    }
+
+    /// Returns the dense row, the multiplier p and the value c = ∂U/∂p of each constraint.
+    fn constraints(&mut self, u: &[f64], matrix: &mut BorderedMatrix) -> Result<Vec<(usize, f64, f64)>, MixedError> {
+        let (_, gradient) = self.system.linearise_shared(u, matrix)?;
+        let body = self.system.body();
+        let shared = body.all()[body.len()..].iter().filter(|unknown| !unknown.fixed);
+        let entries = shared.flat_map(|unknown| (0..unknown.kind.increments()).map(move |i| (unknown, i)));
+        let value = |(row, (unknown, i)): (usize, (&Unknown, usize))| {
+            matrix.multipliers[row].then(|| (row, u[unknown.number + i], gradient[unknown.increment + i]))
+        };
+        Ok(entries.enumerate().filter_map(value).collect())
+    }
+}
+
+/// A penalty for broken constraints c = 0, by which steps with multipliers p are compared: U − p c is the objective f,
+/// and f + Σ ν |c| has its minimum where f has one under the constraints, if ν > |p| (Han 1977).
+pub(super) struct Penalty {
+    /// ν of each constraint.
+    weights: Vec<f64>,
+    /// The derivative of f + Σ ν |c| along the step.
+    pub(super) slope: f64,
 }

@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use super::body::MixedBody;
 use super::term::Placed;
-use crate::matrix::BorderedMatrix;
 use crate::matrix::kinds::{KindPattern, KindSlot};
+use crate::matrix::{BorderedMatrix, index};
 use crate::terms::Curvature;
 use crate::terms::curvature::{change_upper, is_semi_definite};
 
@@ -20,6 +20,8 @@ pub(super) struct Rows {
     pub(super) of: Vec<Option<u32>>,
     /// Whether each dense row belongs to a maximised unknown.
     pub(super) maximised: Vec<bool>,
+    /// Whether each dense row belongs to a multiplier, which counts as maximised.
+    pub(super) multipliers: Vec<bool>,
 }
 
 /// Where the derivatives of a term's elements go.
@@ -27,6 +29,8 @@ pub(super) struct Rows {
 pub(super) struct Scatter {
     /// The unknowns of an element: position of the first increment, and number of increments.
     spans: Vec<(usize, usize)>,
+    /// The positions in the body's gradient of each packed element's increments.
+    increments: Vec<u32>,
     /// Index of the first entry of each row in an upper triangle, less the row.
     starts: Vec<usize>,
     /// Pairs of own unknowns of an element, first ≤ second.
@@ -74,8 +78,14 @@ impl Scatter {
             pairs.iter().map(move |&pair| (place, pair)).map(|(place, pair)| slot(term.stencil(place), pair))
         };
         let slots = (0..term.active.len()).flat_map(of_element).collect();
+        let increments_of = |&unknown: &u32| {
+            let unknown = &body.all()[unknown as usize];
+            unknown.increment..unknown.increment + unknown.kind.increments()
+        };
+        let all = (0..term.active.len()).flat_map(|place| term.stencil(place).iter().flat_map(increments_of));
         let n = term.increments;
         Self {
+            increments: all.map(index).collect(),
             starts: (0..n).map(|row| row * (2 * n - row + 1) / 2 - row).collect(),
             slots,
             shared: positions().filter(is_shared).collect(),
@@ -90,12 +100,10 @@ impl Scatter {
         !self.shared.is_empty()
     }
 
-    /// Adds an element's gradient to that of the body.
-    pub(super) fn add_gradient(&self, body: &MixedBody, stencil: &[u32], own: &[f64], gradient: &mut [f64]) {
-        for (&(from, size), &unknown) in self.spans.iter().zip(stencil) {
-            let to = &mut gradient[body.all()[unknown as usize].increment..][..size];
-            to.iter_mut().zip(&own[from..][..size]).for_each(|(sum, number)| *sum += number);
-        }
+    /// Adds the gradient of a packed element to that of the body.
+    pub(super) fn add_gradient(&self, place: usize, own: &[f64], gradient: &mut [f64]) {
+        let increments = &self.increments[place * own.len()..][..own.len()];
+        increments.iter().zip(own).for_each(|(&increment, number)| gradient[increment as usize] += number);
     }
 
     /// Adds an element's Hessian, an upper triangle, to the matrix.

@@ -114,7 +114,7 @@ impl MixedSystem {
     /// Returns a zero matrix over the free unknowns.
     #[must_use]
     pub fn matrix(&self) -> BorderedMatrix {
-        BorderedMatrix::zeros(&self.rows.pattern, &self.rows.maximised)
+        BorderedMatrix::zeros(&self.rows.pattern, &self.rows.maximised).with_multipliers(&self.rows.multipliers)
     }
 
     /// Returns the name of each term, and what was evaluated and skipped since the system was created.
@@ -164,7 +164,7 @@ impl MixedSystem {
     }
 
     /// Returns U and ∂U/∂u, one number per increment of the body: in N for points, in N m for angles and rotations. The
-    /// entries of fixed unknowns are the negative forces that hold them.
+    /// entries of fixed unknowns are the forces that hold them.
     ///
     /// # Errors
     /// If u is not a configuration of the body, or an element's gradient is not finite.
@@ -184,7 +184,7 @@ impl MixedSystem {
                 for ((place, energy), own) in range.zip(energies).zip(gradients.chunks_exact(n)) {
                     sum.add(*energy);
                     check_finite(term, place, "gradient", own)?;
-                    scatter.add_gradient(&self.body, term.stencil(place), own, &mut gradient);
+                    scatter.add_gradient(place, own, &mut gradient);
                 }
             }
             counts.gradient += tally(term, flagged);
@@ -259,7 +259,7 @@ impl MixedSystem {
                     check_finite(term, place, "gradient", own)?;
                     check_finite(term, place, "Hessian", upper)?;
                     let stencil = term.stencil(place);
-                    scatter.add_gradient(&self.body, stencil, own, &mut gradient);
+                    scatter.add_gradient(place, own, &mut gradient);
                     projected += u64::from(add(&self.rows, scatter, (place, stencil), upper));
                 }
             }
@@ -348,8 +348,8 @@ fn triangle(n: usize) -> usize {
 }
 
 fn check_finite(term: &Placed, place: usize, what: &'static str, numbers: &[f64]) -> Result<(), MixedError> {
-    // The product is NaN if a number is not finite.
-    if numbers.iter().fold(0.0, |sum, number| sum + number * 0.0) == 0.0 {
+    // Without an early end, compilers use vectors.
+    if numbers.iter().fold(true, |all, number| all & number.is_finite()) {
         return Ok(());
     }
     Err(MixedError::NonFiniteElement { term: term.name.clone(), element: term.active[place] as usize, what })
@@ -357,7 +357,8 @@ fn check_finite(term: &Placed, place: usize, what: &'static str, numbers: &[f64]
 
 /// Numbers the free unknowns.
 fn rows(body: &MixedBody, terms: &[Placed]) -> Rows {
-    let (mut of, mut sizes, mut maximised) = (Vec::with_capacity(body.all().len()), Vec::new(), Vec::new());
+    let (mut of, mut sizes) = (Vec::with_capacity(body.all().len()), Vec::new());
+    let (mut maximised, mut multipliers) = (Vec::new(), Vec::new());
     for (number, unknown) in body.all().iter().enumerate() {
         let is_shared = number >= body.len();
         let row = if is_shared { maximised.len() } else { sizes.len() };
@@ -366,7 +367,9 @@ fn rows(body: &MixedBody, terms: &[Placed]) -> Rows {
             continue;
         }
         if is_shared {
-            maximised.extend((0..unknown.kind.increments()).map(|_| unknown.extremum == Extremum::Maximum));
+            let increments = 0..unknown.kind.increments();
+            maximised.extend(increments.clone().map(|_| unknown.extremum != Extremum::Minimum));
+            multipliers.extend(increments.map(|_| unknown.extremum == Extremum::Multiplier));
         } else {
             sizes.push(unknown.kind.increments());
         }
@@ -381,7 +384,7 @@ fn rows(body: &MixedBody, terms: &[Placed]) -> Rows {
     }
     let stencils = ends.windows(2).map(|window| &all[window[0]..window[1]]);
     let pattern = Arc::new(KindPattern::from_stencils(&sizes, stencils));
-    Rows { pattern, of, maximised }
+    Rows { pattern, of, maximised, multipliers }
 }
 
 /// Returns the position in gradients of each entry of the matrix's vectors.
