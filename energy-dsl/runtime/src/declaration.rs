@@ -210,6 +210,14 @@ pub struct Declaration {
 }
 
 impl Declaration {
+    /// Returns the place of the time step, which integrators set, among the numbers of the parameters; `None` without
+    /// `#[time_step(…)]`.
+    #[must_use]
+    pub fn time_step(&self) -> Option<usize> {
+        let place = self.parameters.iter().position(|field| field.kind == FieldKind::TimeStep)?;
+        Some(self.parameters[..place].iter().map(|field| field.size).sum())
+    }
+
     /// Returns whether some unknowns are not points in space that each element has of its own. Such an energy,
     /// constraint or force has the traits of mixed unknowns. Residuals are not mixed: they have any unknowns.
     #[must_use]

@@ -145,6 +145,8 @@ pub(super) struct StateRoutines<E> {
     len: usize,
     read: fn(&E, &mut Vec<f64>),
     write: fn(&mut E, &[f64]),
+    /// Sets the time step; `None` if the elements do not know it.
+    set_time_step: Option<fn(&mut E, f64)>,
     /// Appends the next state. Returns whether it is flagged.
     next: fn(&E, &[f64], &mut Vec<f64>) -> bool,
 }
@@ -155,6 +157,7 @@ impl<E: Stateful<f64>> StateRoutines<E> {
             len: <E::State as Array<f64>>::LEN,
             read: |element, to| to.extend_from_slice(element.state().as_ref()),
             write: |element, from| element.set_state(&<E::State as Array<f64>>::from_fn(|number| from[number])),
+            set_time_step: E::DECLARATION.time_step().map(|_| E::set_time_step as fn(&mut E, f64)),
             next: |element, u, to| {
                 let next = element.next(&<E::Unknowns as Array<f64>>::from_fn(|number| u[number]));
                 to.extend_from_slice(next.state.as_ref());
@@ -196,6 +199,8 @@ pub(super) trait Elements: Debug + Send + Sync {
     fn states(&self) -> Vec<f64>;
     /// Replaces the states of all elements.
     fn set_states(&mut self, states: &[f64]);
+    /// Sets the time step, in s, of elements that know it.
+    fn set_time_step(&mut self, h: f64);
     /// Returns the states after a step that ends at u, and how many are flagged. Nothing changes yet.
     fn next_states(&self, u: &[f64]) -> (Vec<f64>, usize);
     /// Returns the numbers of one element's state.
@@ -288,6 +293,15 @@ where
         for (element, state) in elements.iter_mut().zip(states.chunks_exact(routines.len.max(1))) {
             (routines.write)(element, state);
         }
+        for (place, &element) in active.iter().enumerate() {
+            self.packed.set(place, &elements[element as usize]);
+        }
+    }
+
+    fn set_time_step(&mut self, h: f64) {
+        let Some(States { routines, elements, active, .. }) = &mut self.states else { return };
+        let Some(set) = routines.set_time_step else { return };
+        elements.iter_mut().for_each(|element| set(element, h));
         for (place, &element) in active.iter().enumerate() {
             self.packed.set(place, &elements[element as usize]);
         }

@@ -118,6 +118,8 @@ impl MixedIntegrator {
         let body = self.system.body();
         body.check(&state.u)?;
         body.check_vector("rates", &state.rates, body.increments())?;
+        self.system.set_time_step(h);
+        let body = self.system.body();
         let (time, reference) = match self.scheme {
             MixedScheme::ImplicitEuler => (h, 0.5),
             MixedScheme::ImplicitMidpoint => (0.5 * h, 1.0),

@@ -294,6 +294,11 @@ impl MixedSystem {
         Ok(ElementStates { by_term: self.terms.iter().map(of_term).collect::<Result<_, _>>()? })
     }
 
+    /// Sets the time step, in s, of elements whose declaration has `#[time_step(…)]`. An integrator does so itself.
+    pub fn set_time_step(&mut self, h: f64) {
+        self.terms.iter_mut().for_each(|summed| summed.term.elements.set_time_step(h));
+    }
+
     /// Returns the states of all elements, for [`MixedSystem::restore`].
     #[must_use]
     pub fn states(&self) -> ElementStates {

@@ -23,7 +23,7 @@ fn kinds(field: &Field) -> Vec<String> {
         (FieldKind::Numbers, 2) => ("ENERGY_VEC2", 1),
         (FieldKind::Numbers, 3) => ("ENERGY_VEC3", 1),
         (FieldKind::Numbers, 4) => ("ENERGY_VEC4", 1),
-        (FieldKind::Numbers, size) => ("ENERGY_SCALAR", size),
+        (FieldKind::Numbers | FieldKind::TimeStep, size) => ("ENERGY_SCALAR", size),
     };
     let shared = if field.shared { " + ENERGY_SHARED" } else { "" };
     vec![format!("{kind}{shared}"); count]

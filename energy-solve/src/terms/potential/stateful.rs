@@ -3,7 +3,7 @@
 use std::fmt::Debug;
 
 use energy_dsl::tape::{Column, Output, Places, stencil_blocks};
-use energy_dsl::{Array, Declaration, FieldKind, PackedPotential, RoutineKind, Stateful, Vector3};
+use energy_dsl::{Array, Declaration, PackedPotential, RoutineKind, Stateful, Vector3};
 
 use super::TapeTerm;
 use super::changing::Changing;
@@ -36,7 +36,7 @@ where
     }
 
     fn begin_step(&mut self, dt: f64) -> bool {
-        let changes = knows_time_step(E::DECLARATION) && self.time_step != Some(dt);
+        let changes = E::DECLARATION.time_step().is_some() && self.time_step != Some(dt);
         if changes {
             self.time_step = Some(dt);
             self.elements.iter_mut().for_each(|element| element.set_time_step(dt));
@@ -102,14 +102,9 @@ impl StatefulTapes {
         let states = (0..term.elements.len())
             .flat_map(|element| term.elements.numbers_of(element)[own..own + size].to_vec())
             .collect();
-        let parameters = &term.declaration.parameters;
-        let time_step = parameters
-            .iter()
-            .position(|field| field.kind == FieldKind::TimeStep)
-            .map(|place| parameters[..place].iter().map(|field| field.size).sum());
         let vertex = |number: usize, point: usize| term.stencils().vertex(number, point);
         let stencils = stencil_blocks(term.elements.len(), term.declaration.points.len(), vertex);
-        Self { states, time_step, stencils, term }
+        Self { states, time_step: term.declaration.time_step(), stencils, term }
     }
 
     fn set_states(&mut self, states: Vec<f64>) {
@@ -192,8 +187,4 @@ impl Changing for StatefulTapes {
 /// Returns the numbers of one element's state.
 fn state_size(declaration: &Declaration) -> usize {
     declaration.state.iter().map(|field| field.size).sum()
-}
-
-fn knows_time_step(declaration: &Declaration) -> bool {
-    declaration.parameters.iter().any(|field| field.kind == FieldKind::TimeStep)
 }
