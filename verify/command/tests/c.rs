@@ -13,12 +13,18 @@ use verify_command::stress::sweeps;
 /// A compiler of C or C++, with the options that all code must compile with.
 pub struct Compiler {
     command: Vec<String>,
+    level: &'static str,
 }
 
 impl Compiler {
     /// Splits a command at its spaces.
     pub fn new(command: &str) -> Self {
-        Self { command: command.split_whitespace().map(str::to_owned).collect() }
+        Self { command: command.split_whitespace().map(str::to_owned).collect(), level: "-O1" }
+    }
+
+    /// Compiles fast. Numbers do not depend on the level of optimisation.
+    pub fn unoptimised(self) -> Self {
+        Self { level: "-O0", ..self }
     }
 
     /// Returns the clang that the variable CLANG names, such as `python3 -m ziglang cc`, or that is in `PATH`.
@@ -182,6 +188,7 @@ fn compiled(compiler: &Compiler, elements: &[Interpreted], precision: Precision,
     let output = Command::new(&compiler.command[0])
         .args(&compiler.command[1..])
         .args(OPTIONS)
+        .arg(compiler.level)
         .arg("-I")
         .arg(folder)
         .arg(driver)

@@ -45,12 +45,12 @@ fn c_has_the_bits_of_rust() {
 
 #[test]
 fn c_in_single_precision_has_the_bits_of_rust() {
-    check_all::<f32>(&Compiler::new("gcc -std=c99"), "c-mixed-f32");
+    check_all::<f32>(&Compiler::new("gcc -std=c99").unoptimised(), "c-mixed-f32");
 }
 
 #[test]
 fn c_by_clang_has_the_bits_of_rust() {
-    check_all::<f64>(&Compiler::clang(), "c-mixed-clang-f64");
+    check_all::<f64>(&Compiler::clang().unoptimised(), "c-mixed-clang-f64");
 }
 
 /// Elements whose loops are compared: of each kind of declaration and of unknowns, with and without a state.
@@ -116,7 +116,6 @@ fn loops<S: Bits>(name: &str) {
     let program = folder.join("loops");
     let driver = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/mixed.c");
     let mut gcc = Command::new("gcc");
-    // Numbers do not depend on the level of optimisation, and none compiles fastest.
     gcc.args(["-std=c99", "-march=native"])
         .args(OPTIONS)
         .arg("-O0")
