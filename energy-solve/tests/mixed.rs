@@ -431,13 +431,14 @@ fn a_multiplier_enforces_a_volume_without_compliance() {
     };
     let (expected, report) = find(1e-6, 1.0, &BAND).unwrap();
     assert!(report.converged(), "{report:?}");
-    // Also from far away, where the volume is a tenth of that.
+    // Also from far away, at an eighth and at eight times the volume.
     for size in [1.0, 0.5, 2.0] {
         let (u, report) = find(0.0, size, &BAND).unwrap();
         assert!(report.converged(), "{size}: {report:?}");
         assert!((volume(&u) - 3.0).abs() < 1e-12, "{size}: {}", volume(&u));
+        // The compliance κ = 10⁻⁶ moves the volume by κ p.
         let furthest = u.iter().zip(&expected).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
-        assert!(furthest < 1e-5, "{size}: {furthest:e}");
+        assert!(furthest < 1e-4, "{size}: {furthest:e}");
     }
     let refused = find(0.0, 1.0, &gradients());
     assert!(matches!(refused, Err(MixedNewtonError::Linear(BorderedError::Multiplier))), "{refused:?}");

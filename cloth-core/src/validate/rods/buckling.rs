@@ -118,7 +118,7 @@ energy! {
     energy Roller(x: Point; k: Scalar[N/m]) { k / 2 * (x.y^2 + x.z^2) }
 
     /// A moment s M on the angle of twist of an edge.
-    energy Torque(θ: Scalar[rad], shared s: Scalar[1]; M: Scalar[N m]) { -s * M * θ }
+    energy Torque(twist: Scalar[rad], shared s: Scalar[1]; M: Scalar[N m]) { -s * M * twist }
 }
 
 /// Returns M²/4B² + P/B, times L²/π², at which a strut with a compression P and a torque M on its ends buckles. They

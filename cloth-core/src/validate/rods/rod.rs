@@ -84,7 +84,7 @@ energy! {
     energy InPlane(x: Point; k: Scalar[N/m]) { k / 2 * x.z^2 }
 
     /// Twist between an edge and a fixed frame.
-    energy HeldTwist(θ: Scalar[rad]; k: Scalar[N m]) { k / 2 * θ^2 }
+    energy HeldTwist(twist: Scalar[rad]; k: Scalar[N m]) { k / 2 * twist^2 }
 }
 
 /// A rod at rest under loads that rise step by step.

@@ -160,8 +160,8 @@ impl Grid {
     /// Returns the terms of stretch and bending.
     fn elements(&self, material: Material, curvature: f64) -> Result<Vec<MixedTerm>, ValidateError> {
         let Material { stretching, bending, poisson_ratio } = material;
-        let λ = stretching * poisson_ratio / (1.0 - poisson_ratio * poisson_ratio);
-        let μ = 0.5 * stretching / (1.0 + poisson_ratio);
+        let lambda = stretching * poisson_ratio / (1.0 - poisson_ratio * poisson_ratio);
+        let mu = 0.5 * stretching / (1.0 + poisson_ratio);
         let ghosts = self.border_edges();
         let (points, edges) = (self.rest.len(), self.edges.len());
         let numbers: BTreeMap<[usize; 2], usize> = self.edges.keys().enumerate().map(|(n, edge)| (*edge, n)).collect();
@@ -186,13 +186,13 @@ impl Grid {
             let flat = flattened(at);
             let natural = natural_curvature(at, far_at, flat);
             let [u0, u1, u2] = flat;
-            let [κ11, κ12, κ22] = [natural[0] + curvature, natural[1], natural[2] + curvature];
+            let [k11, k12, k22] = [natural[0] + curvature, natural[1], natural[2] + curvature];
             let [s0, s1, s2] = signs;
-            shells.push(MidEdgeShell::new(u0, u1, u2, bending, poisson_ratio, s0, s1, s2, κ11, κ12, κ22)?);
-            membranes.push(StVK::new(u0, u1, u2, λ, μ)?);
+            shells.push(MidEdgeShell::new(u0, u1, u2, bending, poisson_ratio, s0, s1, s2, k11, k12, k22)?);
+            membranes.push(StVK::new(u0, u1, u2, lambda, mu)?);
             let [a, b, c] = corners;
-            let ([y0, y1, y2], [φ0, φ1, φ2]) = (far, tilts);
-            stencils.push([a, b, c, y0, y1, y2, φ0, φ1, φ2]);
+            let ([y0, y1, y2], [tilt0, tilt1, tilt2]) = (far, tilts);
+            stencils.push([a, b, c, y0, y1, y2, tilt0, tilt1, tilt2]);
         }
         Ok(vec![
             MixedTerm::of_points("membrane", membranes, &self.triangles)?,

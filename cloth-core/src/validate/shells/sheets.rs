@@ -6,11 +6,11 @@ use crate::validate::ValidateError;
 /// Returns the curvature in the middle of a free sheet of length 1, over κ₀. A narrow one bends by κ₀ along and across.
 /// A wide one cannot, as its area would stretch: it rolls up by (1 + ν) κ₀.
 pub(super) fn curvature(width: f64, cells: [usize; 2]) -> Result<f64, ValidateError> {
-    let (ν, natural): (f64, f64) = (0.3, 0.5);
+    let (poisson_ratio, natural): (f64, f64) = (0.3, 0.5);
     let thickness = 2e-3_f64;
     let grid = Grid::new(cells, [1.0, width], |[x, y]| [x, y, 0.0]);
-    let stretching = 12.0 * (1.0 - ν * ν) / (thickness * thickness);
-    let material = Material { stretching, bending: 1.0, poisson_ratio: ν };
+    let stretching = 12.0 * (1.0 - poisson_ratio * poisson_ratio) / (thickness * thickness);
+    let material = Material { stretching, bending: 1.0, poisson_ratio };
     let (i, j) = (cells[0] / 2, cells[1] / 2);
     // One triangle keeps the sheet from moving as a rigid body.
     let fixed = vec![grid.point(i, j), grid.point(i + 1, j), grid.point(i, j + 1)];
