@@ -77,7 +77,7 @@ pub struct Declaration {
     /// Whether the declaration has the attribute `#[vertex]`.
     pub vertices: bool,
     /// The parameter that `#[time_step(…)]` names; `None` without it.
-    pub time_step: Option<Name>,
+    pub time_step: Option<Box<Name>>,
     /// Limits of `#[limits(…)]`; `None` without it.
     pub limits: Option<Limits>,
     /// Kind of the declaration.

@@ -18,7 +18,7 @@ pub(super) struct Attributes {
     pub(super) uncompensated: bool,
     pub(super) vertices: bool,
     pub(super) limits: Option<Limits>,
-    pub(super) time_step: Option<Name>,
+    pub(super) time_step: Option<Box<Name>>,
 }
 
 impl Parser<'_> {
@@ -54,7 +54,7 @@ impl Parser<'_> {
             "vertex" => attributes.vertices = true,
             "time_step" => {
                 self.expect("(", "and the parameter that is the time step, as in #[time_step(h)]")?;
-                attributes.time_step = Some(self.name("the parameter that is the time step")?);
+                attributes.time_step = Some(Box::new(self.name("the parameter that is the time step")?));
                 self.expect(")", "after the name of the time step")?;
             }
             "limits" => attributes.limits = Some(self.limits()?),
