@@ -77,8 +77,8 @@ impl BandFactor {
     fn with_positions(pattern: &Arc<KindPattern>, positions: Vec<usize>) -> Self {
         let half_bandwidth = half_bandwidth(pattern, &positions);
         let stride = (half_bandwidth + 1).next_multiple_of(TOGETHER);
-        // Rows are eliminated in panels, and their updates write rows past the last one.
-        let rows = vec![0.0; (pattern.increments() + half_bandwidth + TOGETHER) * stride];
+        // The update of a row reads and writes whole registers, past the last row too.
+        let rows = vec![0.0; (pattern.increments() + half_bandwidth + 1) * stride + TOGETHER];
         let ordered = vec![0.0; pattern.increments() + stride];
         Self { pattern: Arc::clone(pattern), positions, half_bandwidth, stride, rows, ordered }
     }
@@ -181,8 +181,7 @@ struct BadPivot {
     position: usize,
 }
 
-/// A ← L D Lᵀ, in panels of rows of the upper triangle. Without them, a row would wait for each pivot's row to be
-/// stored.
+/// A ← L D Lᵀ, row by row of the upper triangle.
 struct Elimination<'a> {
     rows: &'a mut [f64],
     count: usize,
@@ -196,81 +195,29 @@ impl Kernel for Elimination<'_> {
     #[inline(always)]
     fn run<L: Level>(self) -> Result<usize, BadPivot> {
         let Self { rows, count, width, stride } = self;
-        let mut panel = Panel::new(width, stride);
+        // The pivot's row and zeros, as updates read past its end.
+        let mut pivot_row = vec![0.0; stride + TOGETHER];
         let mut negative = 0;
-        for first in (0..count).step_by(TOGETHER) {
-            let (own, below) = rows[first * stride..].split_at_mut(TOGETHER * stride);
-            negative += panel
-                .eliminate::<L>(own, TOGETHER.min(count - first))
-                .map_err(|pivot| BadPivot { position: first + pivot })?;
-            for (distance, target) in (1..=width).zip(below.chunks_exact_mut(stride)) {
-                panel.update::<L>(distance, target);
-            }
-        }
-        Ok(negative)
-    }
-}
-
-/// Rows that are eliminated together: each row below is read and written once for all of them.
-struct Panel {
-    width: usize,
-    stride: usize,
-    /// The rows before they are divided by their pivots, followed by zeros.
-    sources: [Vec<f64>; TOGETHER],
-    /// The inverse pivots; 0 for rows past the end of the matrix.
-    inverses: [f64; TOGETHER],
-}
-
-impl Panel {
-    fn new(width: usize, stride: usize) -> Self {
-        let sources = std::array::from_fn(|_| vec![0.0; 2 * (stride + TOGETHER)]);
-        Self { width, stride, sources, inverses: [0.0; TOGETHER] }
-    }
-
-    /// Factors the first `pivots` rows, without the rows below. Returns the number of negative pivots, or the row of a
-    /// bad one as an error.
-    #[inline(always)]
-    fn eliminate<L: Level>(&mut self, own: &mut [f64], pivots: usize) -> Result<usize, usize> {
-        let Self { width, stride, sources, inverses } = self;
-        let (width, stride) = (*width, *stride);
-        inverses[pivots..].fill(0.0);
-        sources[pivots..].iter_mut().for_each(|source| source.fill(0.0));
-        let mut negative = 0;
-        for (pivot, source) in sources.iter_mut().take(pivots).enumerate() {
-            let (row, below) = own[pivot * stride..].split_at_mut(stride);
-            source[..stride].copy_from_slice(row);
-            let inverse = 1.0 / source[0];
+        for position in 0..count {
+            let (row, below) = rows[position * stride..].split_at_mut(stride);
+            pivot_row[..stride].copy_from_slice(row);
+            let pivot = pivot_row[0];
+            let inverse = 1.0 / pivot;
             if !inverse.is_finite() || inverse == 0.0 {
-                return Err(pivot);
+                return Err(BadPivot { position });
             }
-            negative += usize::from(inverse < 0.0);
-            inverses[pivot] = inverse;
-            row.iter_mut().for_each(|entry| *entry *= inverse);
+            negative += usize::from(pivot < 0.0);
             row[0] = inverse;
-            for (distance, target) in (1..=width.min(pivots - 1 - pivot)).zip(below.chunks_exact_mut(stride)) {
-                let factor = -(source[distance] * inverse);
+            row[1..].iter_mut().for_each(|entry| *entry *= inverse);
+            for (distance, target) in (1..=width).zip(below.chunks_exact_mut(stride)) {
+                let factor = -row[distance];
                 let count = (width + 1 - distance).next_multiple_of(TOGETHER);
                 let target = target[..count].as_chunks_mut::<TOGETHER>().0;
-                let entries = source[distance..][..count].as_chunks::<TOGETHER>().0;
-                target.iter_mut().zip(entries).for_each(|(target, source)| add_scaled::<L>(target, factor, source));
+                let source = pivot_row[distance..][..count].as_chunks::<TOGETHER>().0;
+                target.iter_mut().zip(source).for_each(|(target, source)| add_scaled::<L>(target, factor, source));
             }
         }
         Ok(negative)
-    }
-
-    /// Subtracts the multiples of all rows from a row that is `distance` below the last one.
-    #[inline(always)]
-    fn update<L: Level>(&self, distance: usize, target: &mut [f64]) {
-        let count = (self.width + 1 - distance).next_multiple_of(TOGETHER);
-        let from = |pivot: usize| distance + TOGETHER - 1 - pivot;
-        let factors: [f64; TOGETHER] =
-            std::array::from_fn(|pivot| -(self.sources[pivot][from(pivot)] * self.inverses[pivot]));
-        let [a, b, c, d] =
-            std::array::from_fn(|pivot| self.sources[pivot][from(pivot)..][..count].as_chunks::<TOGETHER>().0);
-        let sources = a.iter().zip(b).zip(c).zip(d);
-        for (target, (((a, b), c), d)) in target[..count].as_chunks_mut::<TOGETHER>().0.iter_mut().zip(sources) {
-            add_all_scaled::<L>(target, factors, [a, b, c, d]);
-        }
     }
 }
 
@@ -318,18 +265,6 @@ fn add_scaled<L: Level>(y: &mut [f64; TOGETHER], s: f64, x: &[f64; TOGETHER]) {
     let mut sums = *y;
     for entry in 0..TOGETHER {
         sums[entry] = Number::mul_add::<L>(s, x[entry], sums[entry]);
-    }
-    *y = sums;
-}
-
-/// y ← y + Σ sᵢ xᵢ, in order.
-#[inline(always)]
-fn add_all_scaled<L: Level>(y: &mut [f64; TOGETHER], s: [f64; TOGETHER], x: [&[f64; TOGETHER]; TOGETHER]) {
-    let mut sums = *y;
-    for (s, x) in s.into_iter().zip(x) {
-        for entry in 0..TOGETHER {
-            sums[entry] = Number::mul_add::<L>(s, x[entry], sums[entry]);
-        }
     }
     *y = sums;
 }
