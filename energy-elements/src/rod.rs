@@ -24,8 +24,9 @@ energy! {
     /// length (Bergou, Audoly, Vouga, Wardetzky and Grinspun 2010).
     ///
     /// Reference frames are transported in time: between two steps, m grows by the area on the unit sphere that the path
-    /// of the tangents encloses, from the last ones to the present ones. The state keeps the tangents of the last step, t0 and t1, and its m. It starts with the tangents and
-    /// with m = 0. A tangent must not turn by half a turn within a step.
+    /// of the tangents encloses, from the last ones to the present ones. The state keeps the tangents of the last step, t0
+    /// and t1, and its m. It starts with the tangents and with m = 0. A tangent must not turn by half a turn within a
+    /// step.
     #[audit]
     pub energy RodTwist(
         x0, x1, x2: Point, θ0, θ1: Scalar[rad];
@@ -44,8 +45,9 @@ energy! {
     /// (Bergou, Wardetzky, Robinson, Audoly and Grinspun 2008).
     ///
     /// The frame of an edge is its director d, transported from the tangent t of the last step to the present one, and
-    /// turned by θ. For equal stiffnesses without natural curvature, [`RodBend`] is the same but for terms in the square of
-    /// the twist between the edges, and cheaper. Both elements of an edge transport its director by the same operations, so they keep the same bits.
+    /// turned by θ. For equal stiffnesses without natural curvature, [`RodBend`] is the same but for terms in the square
+    /// of the twist between the edges, and cheaper. Both elements of an edge transport its director by the same
+    /// operations, so they keep the same bits.
     #[audit]
     pub energy RodBendAnisotropic(
         x0, x1, x2: Point, θ0, θ1: Scalar[rad];

@@ -63,12 +63,12 @@ pub struct Curl {
     /// h/(r² + h²). Default 0.
     #[serde(default, with = "Real::<Number>")]
     pub torsion: f64,
-    /// Twisting moment over twist per length, in N m². Default two thirds of `bend_stiffness`, as for a round, incompressible
-    /// strand.
+    /// Twisting moment over twist per length, in N m². Default two thirds of `bend_stiffness`, as for a round,
+    /// incompressible strand.
     #[serde(default, with = "MaybeReal::<NonNegative>")]
     pub twist_stiffness: Option<f64>,
-    /// The axis about which the root curls; its part along the strand does not count. Default [1, 0, 0], or [0, 1, 0] for
-    /// strands along it.
+    /// The axis about which the root curls; its part along the strand does not count. Default [1, 0, 0], or [0, 1, 0]
+    /// for strands along it.
     #[serde(default, with = "MaybeReals::<Number, 3>")]
     pub axis: Option<[f64; 3]>,
 }

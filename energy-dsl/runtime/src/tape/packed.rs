@@ -185,7 +185,7 @@ impl<S: Float> TapeElements<S> {
         }))
     }
 
-    /// Replaces consecutive numbers of the parameters, from `first` on.
+    /// Replaces consecutive numbers of the parameters, from `first` on. What the `rest` block computed stays as it is.
     ///
     /// # Panics
     /// When the column does not have `size` numbers, of each element or of all, or the parameters end before.

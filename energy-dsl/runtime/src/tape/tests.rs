@@ -72,6 +72,7 @@ fn routines() -> Arc<Routines> {
         parameters: 2,
         shape: 1,
         rest,
+        at_rest: None,
         list: vec![force],
         expansion,
         repetition,
@@ -105,6 +106,32 @@ fn expected(number: usize, x: [f64; COORDINATES]) -> [f64; RESULTS] {
     let chosen = if x[0] < 0.0 { x[5] } else { x[1] };
     let product = |result: usize| x[result % 6] * parameter(number) + 8.0 * rest(number);
     std::array::from_fn(|result| if result == RESULTS - 1 { chosen } else { product(result) })
+}
+
+/// Numbers that differed become shared and the other way round, in full blocks and in the last one.
+#[test]
+fn replaced_parameters_are_read() {
+    let mut elements = elements();
+    let result = |elements: &TapeElements| {
+        let rows: Vec<f64> = (0..COUNT).flat_map(coordinates).collect();
+        let mut numbers = vec![0.0; COUNT];
+        let output = Output { name: "numbers", layout: &[0], numbers: &mut numbers };
+        elements.evaluate(RoutineKind::Force, 0..COUNT, Places::Rows(&rows), None, &mut [output]).unwrap();
+        numbers
+    };
+    let wanted = |parameter: &dyn Fn(usize) -> f64| -> Vec<f64> {
+        (0..COUNT).map(|element| coordinates(element)[0] * parameter(element) + 8.0 * rest(element)).collect()
+    };
+    let backwards = |element: usize| parameter(COUNT - element);
+    assert_eq!(result(&elements), wanted(&parameter));
+    elements.set_parameters(0, 1, Column::Each(&(0..COUNT).map(backwards).collect::<Vec<_>>()));
+    assert_eq!(result(&elements), wanted(&backwards));
+    elements.set_parameters(0, 1, Column::Same(&[3.0]));
+    assert_eq!(result(&elements), wanted(&|_| 3.0));
+    let both: Vec<f64> = (0..COUNT).flat_map(|element| [parameter(element), backwards(element)]).collect();
+    elements.set_parameters(0, 2, Column::Each(&both));
+    assert_eq!(result(&elements), wanted(&parameter));
+    assert_eq!(elements.numbers_of(COUNT - 1)[..2], [parameter(COUNT - 1), backwards(COUNT - 1)]);
 }
 
 const RANGES: [Range<usize>; 5] = [0..COUNT, 0..64, 64..128, 128..COUNT, 64..67];
