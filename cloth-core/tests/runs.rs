@@ -187,9 +187,9 @@ fn a_resumed_run_keeps_the_memory_of_declared_elements() {
     let [plastic, elastic] = ["whole", "elastic"].map(|run| read(&folder.path().join(run), "frames/cloth_0015.obj"));
     assert!(plastic != elastic);
     // A state without a value at rest, and a time step given as a parameter.
-    std::fs::write(folder.path().join("memory.energy"), MEMORY.replace(" = L;", ";")).unwrap();
+    std::fs::write(folder.path().join("memory.energy"), MEMORY.replace("Scalar = 0;", "Scalar;")).unwrap();
     let message = refused(&["run", "scene.toml", "-o", "bad"], folder.path());
-    assert!(message.contains("Creep is an energy whose state `l` has no value at rest"), "{message}");
+    assert!(message.contains("PlasticHinge is an energy whose state `ψ` has no value at rest"), "{message}");
     std::fs::write(folder.path().join("memory.energy"), MEMORY).unwrap();
     std::fs::write(folder.path().join("scene.toml"), text(0.02).replace("c = 40.0", "c = 40.0, h = 0.1")).unwrap();
     let message = refused(&["run", "scene.toml", "-o", "bad"], folder.path());

@@ -86,6 +86,7 @@ impl Problem<'_> {
         }
         Ok(self.energy(u)?)
     }
+
     /// Returns the penalty of a step with these increments, along which the potential has this slope by all unknowns
     /// but the maximised ones. Without multipliers it is 0.
     pub(super) fn penalty(
