@@ -122,6 +122,6 @@ fn twisted(cases: &mut Cases<'_>) -> Result<(), ValidateError> {
     let steps = if cases.quick { 100 } else { 1_000 };
     let [linking, writhe] = linking::drift(if cases.quick { 24 } else { 40 }, steps)?;
     let case = format!("Tw + Wr of a ring, {steps} steps, |Wr| to {writhe:.2}");
-    (cases.report)(Finding::absolute("rods", case, linking, 2.0, 1e-12));
+    (cases.report)(Finding::absolute("rods", case, linking, 1.0, 1e-12));
     Ok(())
 }
