@@ -79,6 +79,14 @@ impl Finding {
         Self { question, case, measured, exact, error: measured / exact - 1.0, limit }
     }
 
+    /// Creates a finding of the order with which an error falls from a coarse mesh to one that is finer by a factor. It
+    /// is 2, and must be 1.8 at least.
+    fn order(question: &'static str, case: &str, [coarse, fine]: [f64; 2], finer: f64) -> Self {
+        let measured = (coarse / fine).abs().ln() / finer.ln();
+        let error = (1.8 - measured).max(0.0);
+        Self { question, case: format!("{case}: order"), measured, exact: 2.0, error, limit: 0.0 }
+    }
+
     /// Creates a finding with the error measured − exact.
     fn absolute(question: &'static str, case: String, measured: f64, exact: f64, limit: f64) -> Self {
         Self { question, case, measured, exact, error: measured - exact, limit }

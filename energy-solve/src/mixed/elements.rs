@@ -232,6 +232,15 @@ struct States<E> {
     numbers: Vec<u32>,
     /// The packed elements.
     active: Vec<u32>,
+    /// The time step, in s, once it is set.
+    time_step: Option<f64>,
+}
+
+/// Packs the active ones of some elements after they changed.
+fn pack_again<E: Stored<f64>>(packed: &mut Packed<E>, elements: &[E], active: &[u32]) {
+    for (place, &element) in active.iter().enumerate() {
+        packed.set(place, &elements[element as usize]);
+    }
 }
 
 impl<E, K> Unplaced for Listed<E, K>
@@ -245,7 +254,8 @@ where
         let element = |place: usize| &elements[active[place] as usize];
         let index = |place: usize, number: usize| stencils[active[place] as usize * per_element + number];
         let packed = Packed::from_fn(active.len(), per_element, element, index);
-        let states = routines.map(|routines| States { routines, elements, numbers, active: active.to_vec() });
+        let states =
+            routines.map(|routines| States { routines, elements, numbers, active: active.to_vec(), time_step: None });
         Box::new(PackedElements { packed, states, kernels })
     }
 }
@@ -293,18 +303,15 @@ where
         for (element, state) in elements.iter_mut().zip(states.chunks_exact(routines.len.max(1))) {
             (routines.write)(element, state);
         }
-        for (place, &element) in active.iter().enumerate() {
-            self.packed.set(place, &elements[element as usize]);
-        }
+        pack_again(&mut self.packed, elements, active);
     }
 
     fn set_time_step(&mut self, h: f64) {
-        let Some(States { routines, elements, active, .. }) = &mut self.states else { return };
-        let Some(set) = routines.set_time_step else { return };
+        let Some(States { routines, elements, active, time_step, .. }) = &mut self.states else { return };
+        let Some(set) = routines.set_time_step.filter(|_| *time_step != Some(h)) else { return };
+        *time_step = Some(h);
         elements.iter_mut().for_each(|element| set(element, h));
-        for (place, &element) in active.iter().enumerate() {
-            self.packed.set(place, &elements[element as usize]);
-        }
+        pack_again(&mut self.packed, elements, active);
     }
 
     fn next_states(&self, u: &[f64]) -> (Vec<f64>, usize) {

@@ -94,8 +94,10 @@ impl DrivenLaw for CurledStrands {
             Strand::new(&self.hair, &edges, self.rooted).relax(&mut edges);
             for (element, pair) in elements.iter_mut().zip(edges.windows(2)) {
                 let next = self.hair.element([pair[0], pair[1]]);
-                changes |= next.state() != element.state();
-                *element = next;
+                if next.state() != element.state() {
+                    *element = next;
+                    changes = true;
+                }
             }
         }
         changes

@@ -1,7 +1,8 @@
 //! Rods that bend far: hanging curls, a bent cantilever, and a rod that a moment closes to a circle.
 
 use super::ValidateError;
-use super::rod::{Ends, Rod, Vector, arc, difference, distance, weights};
+use super::rod::{Ends, Rod, Vector, arc, weights};
+use crate::geometry::{norm, subtract};
 
 /// Returns how far a naturally curved rod that hangs from a clamp reaches sideways and down, over its length L = 1.
 pub(super) fn hanging_curl(weight: f64, curvature: f64, segments: usize) -> Result<[f64; 2], ValidateError> {
@@ -31,7 +32,7 @@ pub(super) fn bent_cantilever(segments: usize) -> Result<Vector, ValidateError> 
     rod.loads[segments + 1] = [0.0, 600.0, 0.0];
     let mut loaded = rod.at_rest()?;
     loaded.raise(10)?;
-    Ok(difference(loaded.tip(), points[segments + 1]))
+    Ok(subtract(loaded.tip(), points[segments + 1]))
 }
 
 /// Returns the distance between the ends of a rod of length 1 that the moment 2π B/L at its tip bends to a circle.
@@ -41,5 +42,5 @@ pub(super) fn closed_circle(segments: usize) -> Result<f64, ValidateError> {
     let moment = rod.moments(&[(segments, std::f64::consts::TAU, [0.0, 1.0, 0.0])])?;
     let mut loaded = rod.at_rest_with(vec![moment])?;
     loaded.raise(20)?;
-    Ok(distance(loaded.tip(), [0.0; 3]))
+    Ok(norm(loaded.tip()))
 }

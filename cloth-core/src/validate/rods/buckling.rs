@@ -7,8 +7,8 @@ use super::ValidateError;
 use super::rod::{Ends, Loaded, Rod, Vector, arc, ring, weights};
 use crate::validate::critical_load::{Symmetry, critical_load};
 
-/// Returns the largest load that passes, within a relative tolerance. It is below `high`.
-fn largest(
+/// Returns the largest load, or another number, that passes, within a relative tolerance. It is below `high`.
+pub(super) fn largest(
     high: f64,
     tolerance: f64,
     mut passes: impl FnMut(f64) -> Result<bool, ValidateError>,

@@ -2,7 +2,8 @@
 //! under tension and torque (van der Heijden and Thompson 2000).
 
 use super::ValidateError;
-use super::rod::{Ends, Loaded, Rod, Vector, difference, unit};
+use super::rod::{Ends, Loaded, Rod, Vector, unit};
+use crate::geometry::subtract;
 
 /// Finds the equilibrium of a rod through points whose first and last edges are fixed. It is evenly twisted at the
 /// start.
@@ -75,7 +76,7 @@ pub(super) fn localised(segments: usize) -> Result<[f64; 3], ValidateError> {
     rod.tolerance = 1e-6;
     let mut loaded = settled(rod, twist, spacing)?;
     let (force, moment) = loaded.held_end()?;
-    let steepest = |edge: usize| unit(difference(loaded.point(edge + 1), loaded.point(edge)))[2].acos();
+    let steepest = |edge: usize| unit(subtract(loaded.point(edge + 1), loaded.point(edge)))[2].acos();
     let angle = (0..segments).map(steepest).fold(0.0, f64::max);
     Ok([moment[2] * LONG / LONG_BENDING, force[2] * LONG * LONG / LONG_BENDING, angle])
 }

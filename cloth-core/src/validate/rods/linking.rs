@@ -3,7 +3,8 @@
 use energy_solve::{Inertia, KindSolver, MixedIntegrator, MixedNewtonOptions, MixedScheme, MixedState};
 
 use super::ValidateError;
-use super::rod::{Ends, Rod, Vector, cross, difference, dot, ring, unit};
+use super::rod::{Ends, Rod, Vector, ring, unit};
+use crate::geometry::{cross, dot, subtract};
 
 /// Returns Tw + Wr of a closed rod with a linking number of 1 after each of some steps, at its furthest from 1, and how
 /// far the writhe changed.
@@ -56,7 +57,7 @@ fn writhe(points: &[Vector]) -> f64 {
             if (j + 1) % count != i {
                 let [a, b] = [points[i], points[(i + 1) % count]];
                 let [c, d] = [points[j], points[(j + 1) % count]];
-                let corners = [(a, c), (b, c), (b, d), (a, d)].map(|(from, to)| unit(difference(to, from)));
+                let corners = [(a, c), (b, c), (b, d), (a, d)].map(|(from, to)| unit(subtract(to, from)));
                 area +=
                     solid_angle(corners[0], corners[1], corners[2]) + solid_angle(corners[0], corners[2], corners[3]);
             }

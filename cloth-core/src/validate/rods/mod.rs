@@ -46,11 +46,8 @@ impl Cases<'_> {
             let finding = if exact == 0.0 { Finding::absolute } else { Finding::relative };
             (self.report)(finding("rods", case.clone(), found, exact, 5e-3));
             if let Some(before) = before {
-                let order =
-                    ((before[number] - exact) / (found - exact)).abs().ln() / (fine as f64 / coarse as f64).ln();
-                let case = format!("{case}: order");
-                let error = (1.8 - order).max(0.0);
-                (self.report)(Finding { question: "rods", case, measured: order, exact: 2.0, error, limit: 0.0 });
+                let errors = [before[number], found].map(|found| found - exact);
+                (self.report)(Finding::order("rods", &case, errors, fine as f64 / coarse as f64));
             }
         }
         Ok(())

@@ -8,8 +8,9 @@ use energy_solve::{
 };
 
 use super::ValidateError;
+use crate::geometry::{cross, norm, subtract};
 
-pub(super) type Vector = [f64; 3];
+pub(super) type Vector = energy_dsl::Vector3<f64>;
 
 /// A rod: points along its centre line, and the moduli of its cross section.
 #[derive(Clone, Debug)]
@@ -100,7 +101,7 @@ impl Rod {
     pub(super) fn new(points: Vec<Vector>, director: Vector, ends: Ends, bending: [f64; 2], twisting: f64) -> Self {
         let count = points.len();
         let edges = if ends.ring().is_some() { count } else { count - 1 };
-        let length = distance(points[1], points[2]) * edges as f64;
+        let length = norm(subtract(points[1], points[2])) * edges as f64;
         // Stretches by less than 10⁻⁸ of what bends.
         let stretching = 1e5 * bending[0].max(bending[1]) / (length * length);
         // The twist of a ring is spread evenly.
@@ -140,7 +141,7 @@ impl Rod {
 
     fn tangent(&self, edge: usize) -> Vector {
         let count = self.points.len();
-        unit(difference(self.points[(edge + 1) % count], self.points[edge % count]))
+        unit(subtract(self.points[(edge + 1) % count], self.points[edge % count]))
     }
 
     /// Returns the unknowns that are fixed.
@@ -160,7 +161,7 @@ impl Rod {
             [UnknownKind::Vector3, UnknownKind::Scalar].into_iter().take(if point < self.edges() { 2 } else { 1 })
         };
         let kinds: Vec<UnknownKind> = (0..self.points.len()).flat_map(of_point).collect();
-        let spacing = distance(self.points[1], self.points[2]);
+        let spacing = norm(subtract(self.points[1], self.points[2]));
         let body = MixedBody::new(&kinds, spacing).with_shared(UnknownKind::Scalar, Extremum::Minimum, 1.0);
         Ok(body.with_fixed(&self.fixed())?.with_fixed_shared(&[0])?)
     }
@@ -175,10 +176,10 @@ impl Rod {
 
     fn elastic_terms(&self) -> Result<Vec<MixedTerm>, ValidateError> {
         let count = self.points.len();
-        let spacing = distance(self.points[1], self.points[2]);
+        let spacing = norm(subtract(self.points[1], self.points[2]));
         let edges: Vec<[usize; 2]> = (0..self.edges()).map(|edge| [self.point(edge), self.point(edge + 1)]).collect();
         let springs = (0..self.edges()).map(|edge| {
-            let length = distance(self.points[edge], self.points[(edge + 1) % count]);
+            let length = norm(subtract(self.points[edge], self.points[(edge + 1) % count]));
             HookeSpring::new(self.stretching / length, length)
         });
         let (mut bends, mut round, mut twists) = (Vec::new(), Vec::new(), Vec::new());
@@ -220,7 +221,7 @@ impl Rod {
         let held: Vec<[usize; 1]> = is_fixed_ring.then(|| [self.point(count / 2)]).into_iter().collect();
         let plane = held.iter().map(|_| InPlane::new(1e-4 * self.bending[0])).collect();
         // Half an edge twists between a hinge and the middle of the edge there.
-        let spacing = distance(self.points[1], self.points[2]);
+        let spacing = norm(subtract(self.points[1], self.points[2]));
         let hinges = if self.ends == Ends::Hinged { vec![0, self.edges() - 1] } else { Vec::new() };
         let held_twists = hinges.iter().map(|_| HeldTwist::new(2.0 * self.twisting / spacing)).collect();
         let ends: Vec<[usize; 1]> = hinges.iter().map(|&edge| [self.twist(edge)]).collect();
@@ -249,7 +250,7 @@ impl Rod {
     /// Returns the rod with other terms, and without loads.
     pub(super) fn at_rest_with(&self, others: Vec<MixedTerm>) -> Result<Loaded, ValidateError> {
         let system = self.system(others)?;
-        let spacing = distance(self.points[1], self.points[2]);
+        let spacing = norm(subtract(self.points[1], self.points[2]));
         let options =
             MixedNewtonOptions::new(self.tolerance * spacing).with_stride(20.0 * spacing).with_iteration_limit(300);
         let newton = MixedNewton::new(&system, &KindSolver::Automatic, options);
@@ -309,7 +310,7 @@ impl Loaded {
         let (_, gradient) = self.system.gradient(&self.u)?;
         let at = |unknown: usize| self.system.body().first_increment(unknown);
         let (last, twist) = (self.points - 1, gradient[at(2 * self.points - 3)]);
-        let along = unit(difference(self.point(last), self.point(last - 1)));
+        let along = unit(subtract(self.point(last), self.point(last - 1)));
         let (mut force, mut moment) = ([0.0; 3], along.map(|t| twist * t));
         for point in [last - 1, last] {
             let own: Vector = std::array::from_fn(|axis| gradient[at(2 * point) + axis]);
@@ -352,23 +353,7 @@ pub(super) fn weights(points: usize, spacing: f64, weight: Vector) -> Vec<Vector
     (0..points).map(|number| weight.map(|w| share(number) * spacing * w)).collect()
 }
 
-pub(super) fn difference(a: Vector, b: Vector) -> Vector {
-    std::array::from_fn(|axis| a[axis] - b[axis])
-}
-
-pub(super) fn distance(a: Vector, b: Vector) -> f64 {
-    difference(a, b).iter().map(|x| x * x).sum::<f64>().sqrt()
-}
-
 pub(super) fn unit(v: Vector) -> Vector {
-    let length = distance(v, [0.0; 3]);
+    let length = norm(v);
     v.map(|x| x / length)
-}
-
-pub(super) fn cross(a: Vector, b: Vector) -> Vector {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-}
-
-pub(super) fn dot(a: Vector, b: Vector) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }

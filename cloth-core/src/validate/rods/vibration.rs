@@ -1,6 +1,7 @@
 //! Frequencies of a clamped rod, from its stiffness and its masses.
 
 use super::ValidateError;
+use super::buckling::largest;
 use super::rod::{Ends, Loaded, Rod, arc};
 use energy_solve::UnknownKind;
 
@@ -41,10 +42,5 @@ fn frequency(loaded: &mut Loaded, kind: UnknownKind, mode: usize, segments: usiz
         }
         Ok(factor.factor(matrix.kinds())?)
     };
-    let (mut low, mut high) = (0.0, 100.0);
-    while high - low > 1e-9 * high {
-        let middle = 0.5 * (low + high);
-        *(if slower(middle)? < mode { &mut low } else { &mut high }) = middle;
-    }
-    Ok(0.5 * (low + high))
+    largest(100.0, 1e-9, |frequency| Ok(slower(frequency)? < mode))
 }

@@ -9,9 +9,10 @@ use energy_solve::{
     KindSolver, MixedBody, MixedNewton, MixedNewtonOptions, MixedNewtonReport, MixedSystem, MixedTerm, UnknownKind,
 };
 
+use crate::geometry::{add_scaled, cross, dot, norm, subtract};
 use crate::validate::ValidateError;
 
-pub(super) type Vector = [f64; 3];
+pub(super) type Vector = energy_dsl::Vector3<f64>;
 
 energy! {
     /// Springs along the axes that hold a point at c.
@@ -112,12 +113,11 @@ impl Grid {
     /// Returns the mirror image of a corner at an edge, and the normal of the mirror.
     fn mirrored(&self, edge: [usize; 2], corner: usize) -> (Vector, Vector) {
         let [a, b, c] = [edge[0], edge[1], corner].map(|point| self.rest[point]);
-        let along = unit(difference(b, a));
-        let from = difference(c, a);
-        let part = dot(from, along);
-        let normal = unit(std::array::from_fn(|axis| from[axis] - part * along[axis]));
+        let along = unit(subtract(b, a));
+        let from = subtract(c, a);
+        let normal = unit(add_scaled(from, -dot(from, along), along));
         let height = dot(from, normal);
-        (std::array::from_fn(|axis| c[axis] - 2.0 * height * normal[axis]), normal)
+        (add_scaled(c, -2.0 * height, normal), normal)
     }
 
     /// Finds the equilibrium from a start, by Newton's method.
@@ -232,9 +232,9 @@ impl Grid {
 
 /// Returns the corners of a triangle in its plane.
 fn flattened([a, b, c]: [Vector; 3]) -> [[f64; 2]; 3] {
-    let (d, e) = (difference(b, a), difference(c, a));
-    let length = dot(d, d).sqrt();
-    [[0.0; 2], [length, 0.0], [dot(d, e) / length, dot(cross(d, e), cross(d, e)).sqrt() / length]]
+    let (d, e) = (subtract(b, a), subtract(c, a));
+    let length = norm(d);
+    [[0.0; 2], [length, 0.0], [dot(d, e) / length, norm(cross(d, e)) / length]]
 }
 
 /// Returns κ11, κ12 and κ22 that the mid-edge normals have at rest, without tilts.
@@ -253,30 +253,17 @@ fn natural_curvature(at: [Vector; 3], far: [Vector; 3], flat: [[f64; 2]; 3]) -> 
 
 /// Returns the angle between the triangles a c d and b c d, 0 if they are flat.
 fn dihedral(a: Vector, b: Vector, c: Vector, d: Vector) -> f64 {
-    let edge = difference(d, c);
-    let first = cross(edge, difference(a, c));
-    let second = cross(difference(b, c), edge);
+    let edge = subtract(d, c);
+    let first = cross(edge, subtract(a, c));
+    let second = cross(subtract(b, c), edge);
     dot(cross(first, second), unit(edge)).atan2(dot(first, second))
 }
 
 fn area([a, b, c]: [Vector; 3]) -> f64 {
-    let normal = cross(difference(b, a), difference(c, a));
-    0.5 * dot(normal, normal).sqrt()
-}
-
-pub(super) fn difference(a: Vector, b: Vector) -> Vector {
-    std::array::from_fn(|axis| a[axis] - b[axis])
-}
-
-pub(super) fn dot(a: Vector, b: Vector) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
+    0.5 * norm(cross(subtract(b, a), subtract(c, a)))
 }
 
 fn unit(v: Vector) -> Vector {
-    let length = dot(v, v).sqrt();
+    let length = norm(v);
     v.map(|x| x / length)
-}
-
-pub(super) fn cross(a: Vector, b: Vector) -> Vector {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }

@@ -1,6 +1,7 @@
 //! Flat sheets whose natural curvature κ₀ is the same in all directions.
 
-use super::grid::{Grid, Material, Support, Vector, cross, difference, dot};
+use super::grid::{Grid, Material, Support, Vector};
+use crate::geometry::{cross, norm, subtract};
 use crate::validate::ValidateError;
 
 /// Returns the curvature in the middle of a free sheet of length 1, over κ₀. A narrow one bends by κ₀ along and across.
@@ -35,8 +36,6 @@ fn rolled([x, y]: [f64; 2], middle: f64, curvature: f64) -> Vector {
 /// Returns the curvature of the circle through three points: four times the area of their triangle over the product of
 /// its sides.
 fn circle_curvature(a: Vector, b: Vector, c: Vector) -> f64 {
-    let sides = [difference(b, a), difference(c, b), difference(a, c)];
-    let normal = cross(sides[0], sides[1]);
-    let lengths: f64 = sides.iter().map(|side| dot(*side, *side).sqrt()).product();
-    2.0 * dot(normal, normal).sqrt() / lengths
+    let sides = [subtract(b, a), subtract(c, b), subtract(a, c)];
+    2.0 * norm(cross(sides[0], sides[1])) / sides.map(norm).iter().product::<f64>()
 }

@@ -210,7 +210,9 @@ ENERGY_FN void @run_each(const @element *element, int32_t routine, @batch *batch
             @read_points(batch, &batch->v, i, element->coordinates, v);
         }
         @read(&batch->parameters, i, element->parameters, parameters);
-        @read(&batch->stored, i, element->stored, stored);
+        if (routine != ENERGY_REST) {
+            @read(&batch->stored, i, element->stored, stored);
+        }
         flags = is_vertex ? @run_vertex(element, batch, i, arguments, results)
                           : element->run(routine, arguments, results);
         for (place = 0; place < 3; place++) {

@@ -33,8 +33,6 @@ pub struct TapeElements<S = f64> {
 /// Numbers of elements. Those that all elements share are held once.
 #[derive(Clone, Debug)]
 pub(super) struct Numbers<S> {
-    /// Number of elements.
-    count: usize,
     sources: Vec<Source<S>>,
     /// Numbers that differ between elements.
     columns: usize,
@@ -73,7 +71,7 @@ impl<S: Float> Numbers<S> {
                 *stored = numbers[(block * TAPE_BLOCK + element).min(count - 1) * size + number];
             }
         }
-        Self { count, sources, columns: each.len(), blocks: stored }
+        Self { sources, columns: each.len(), blocks: stored }
     }
 
     /// Returns the number that all elements share; `None` if it differs.
@@ -86,28 +84,33 @@ impl<S: Float> Numbers<S> {
 
     /// Replaces a number by one that all elements share.
     fn share(&mut self, number: usize, value: S) {
-        match self.sources[number] {
-            Source::Same(_) => self.sources[number] = Source::Same(value),
-            Source::Each(_) => self.set_each(number, |_| value),
+        match &mut self.sources[number] {
+            Source::Same(shared) => *shared = value,
+            &mut Source::Each(column) => self.fill_column(column, |_| value),
         }
     }
 
-    /// Replaces a number by a function of the elements. It gets a column if all elements shared it.
-    fn set_each(&mut self, number: usize, value: impl Fn(usize) -> S) {
+    /// Replaces a number by a function of the `count` elements. It gets a column if they shared it.
+    fn set_each(&mut self, number: usize, count: usize, value: impl Fn(usize) -> S) {
         let column = match self.sources[number] {
             Source::Each(column) => column,
-            Source::Same(_) => self.add_column(),
+            Source::Same(_) => self.add_column(count.div_ceil(TAPE_BLOCK)),
         };
         self.sources[number] = Source::Each(column);
+        self.fill_column(column, |element| value(element.min(count.saturating_sub(1))));
+    }
+
+    /// Replaces a column by a function of the elements, with surplus ones of the last block.
+    fn fill_column(&mut self, column: usize, value: impl Fn(usize) -> S) {
         let slots = self.blocks.as_chunks_mut::<TAPE_BLOCK>().0.iter_mut();
         for (block, slot) in slots.skip(column).step_by(self.columns).enumerate() {
             slot.iter_mut().enumerate().for_each(|(at, stored)| *stored = value(block * TAPE_BLOCK + at));
         }
     }
 
-    /// Adds a column of zeros, and returns its index.
-    fn add_column(&mut self) -> usize {
-        let (old, count) = (self.columns, self.count.div_ceil(TAPE_BLOCK));
+    /// Adds a column of zeros for this many blocks, and returns its index.
+    fn add_column(&mut self, count: usize) -> usize {
+        let old = self.columns;
         let mut blocks = Aligned::new(count * (old + 1) * TAPE_BLOCK, S::from_f64(0.0));
         for (place, slot) in blocks.as_chunks_mut::<TAPE_BLOCK>().0.iter_mut().enumerate() {
             let (block, column) = (place / (old + 1), place % (old + 1));
@@ -200,8 +203,7 @@ impl<S: Float> TapeElements<S> {
             match column {
                 Column::Same(numbers) => self.numbers.share(first + number, numbers[number]),
                 Column::Each(numbers) => {
-                    let last = self.count.saturating_sub(1);
-                    self.numbers.set_each(first + number, |element| numbers[element.min(last) * size + number]);
+                    self.numbers.set_each(first + number, self.count, |element| numbers[element * size + number]);
                 }
             }
         }
@@ -248,7 +250,7 @@ impl<S: Float> TapeElements<S> {
                 *number = old[index / TAPE_BLOCK * columns + column][index % TAPE_BLOCK];
             }
         }
-        let numbers = Numbers { count: indices.len(), sources: self.numbers.sources.clone(), columns, blocks: stored };
+        let numbers = Numbers { sources: self.numbers.sources.clone(), columns, blocks: stored };
         Self { routines: Arc::clone(&self.routines), count: indices.len(), numbers, spare: Spare::default() }
     }
 

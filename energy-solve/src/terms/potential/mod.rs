@@ -153,6 +153,7 @@ impl Term for TapeTerm {
     }
 }
 
-fn character(&Declaration { quadratic, curved, .. }: &Declaration) -> Character {
-    Character { symmetric: true, velocity_dependent: false, quadratic, curved }
+fn character(&Declaration { quadratic, curved, ref state, .. }: &Declaration) -> Character {
+    // A state may change second derivatives that are constant during a step.
+    Character { symmetric: true, velocity_dependent: false, quadratic: quadratic && state.is_empty(), curved }
 }

@@ -15,7 +15,7 @@ use crate::terms::active::Active;
 use crate::terms::element_list::ElementList;
 use crate::terms::scatter_map::ScatterMaps;
 use crate::terms::stencils::Stencils;
-use crate::terms::term::{Character, TermDescription};
+use crate::terms::term::{MadeFromTerm, TermDescription};
 
 /// Elements with a state, each advanced by its `next` at the end of a step; see [`DrivenTerm::with_memory`].
 #[derive(Clone, Debug)]
@@ -49,7 +49,7 @@ where
         for (number, element) in self.elements.iter_mut().enumerate() {
             let u = |place: usize| x[stencils.vertex(number, place / 3) as usize][place % 3];
             let next = element.next(&E::Unknowns::from_fn(u)).state;
-            changes |= next.as_ref() != element.state().as_ref();
+            changes |= differ(next.as_ref(), element.state().as_ref());
             element.set_state(&next);
         }
         changes
@@ -114,22 +114,9 @@ impl StatefulTapes {
     }
 }
 
-impl TermDescription for StatefulTapes {
-    fn name(&self) -> &str {
-        self.term.name()
-    }
-
-    fn declaration(&self) -> &Declaration {
-        self.term.declaration()
-    }
-
-    /// A state may change second derivatives that are constant during a step.
-    fn character(&self) -> Character {
-        Character { quadratic: false, ..self.term.character() }
-    }
-
-    fn stencils(&self) -> Stencils<'_> {
-        self.term.stencils()
+impl MadeFromTerm for StatefulTapes {
+    fn term(&self) -> &dyn TermDescription {
+        &self.term
     }
 }
 
@@ -166,7 +153,7 @@ impl Changing for StatefulTapes {
             .elements
             .evaluate(RoutineKind::Next, all, places, None, &mut [output])
             .expect("stencils and states fit the elements");
-        let changes = states != self.states;
+        let changes = differ(&states, &self.states);
         if changes {
             self.set_states(states);
         }
@@ -187,4 +174,9 @@ impl Changing for StatefulTapes {
 /// Returns the numbers of one element's state.
 fn state_size(declaration: &Declaration) -> usize {
     declaration.state.iter().map(|field| field.size).sum()
+}
+
+/// Whether two states differ in any bit: checkpoints keep bits.
+fn differ(a: &[f64], b: &[f64]) -> bool {
+    a.iter().zip(b).any(|(a, b)| a.to_bits() != b.to_bits())
 }
