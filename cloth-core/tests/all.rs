@@ -4,6 +4,7 @@
 mod command_line;
 mod curled_hair;
 mod damping;
+mod declared_materials;
 mod deforming_obstacles;
 mod drills;
 mod endings;

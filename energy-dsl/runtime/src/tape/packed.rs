@@ -188,7 +188,8 @@ impl<S: Float> TapeElements<S> {
         }))
     }
 
-    /// Replaces consecutive numbers of the parameters, from `first` on. What the `rest` block computed stays as it is.
+    /// Replaces consecutive numbers of the parameters, from `first` on. The numbers of the `rest` block stay as they
+    /// are.
     ///
     /// # Panics
     /// When the column does not have `size` numbers, of each element or of all, or the parameters end before.

@@ -75,6 +75,12 @@ pub enum DeclaredError {
         /// A description of the element.
         what: String,
     },
+    /// A state does not say where it begins.
+    #[error(
+        "{}: the state `{state}` of {element} has no value at rest; a material needs one, as in `state {state}: Scalar = 0`",
+        .path.display()
+    )]
+    NoStateAtRest { path: PathBuf, element: String, state: String },
     /// A parameter is not given and has no default.
     #[error(
         "{}: {element} needs the parameter `{parameter}`{unit}; give it as `parameters.{parameter}`",

@@ -59,6 +59,9 @@ impl Declared {
         if declaration.kind != Kind::Energy {
             return Err(unfit(format!("a {}", declaration.kind.keyword())));
         }
+        if declaration.is_mixed() {
+            return Err(unfit("an energy with unknowns that are not points of each element".to_owned()));
+        }
         let sites = sites(declaration.points.len(), target)
             .ok_or_else(|| unfit(format!("an energy of {} points", declaration.points.len())))?;
         let has_points_at_rest = declaration.rest.iter().any(|field| field.size == 3);
@@ -78,10 +81,11 @@ impl Declared {
         };
         let states = element.states_at_rest(sites.len(), &each(&rest), &each(&parameters)).map_err(misfit)?;
         if let Some(state) = declaration.state.first().filter(|_| states.is_none()) {
-            return Err(unfit(format!(
-                "an energy whose state `{0}` has no value at rest; a material needs one, as in `state {0}: Scalar = 0`",
-                state.name
-            )));
+            return Err(DeclaredError::NoStateAtRest {
+                path: self.path.clone(),
+                element: declaration.name.to_string(),
+                state: state.name.to_string(),
+            });
         }
         let size = declaration.state.iter().map(|field| field.size).sum::<usize>().max(1);
         let states = columns(&declaration.state, states.as_deref().unwrap_or(&[]).chunks_exact(size));
