@@ -26,7 +26,7 @@
 //! To use another library's solver, [`BlockMatrix::to_csr`], [`BlockMatrix::to_bsr`] and [`BlockMatrix::to_triplets`]
 //! export the matrix; [`Csr`] shows the calls for nalgebra-sparse, sprs and faer.
 //!
-//! Contact is not a sum of fixed elements: see [`ContactModel`] and [`OverRelaxation::scale_with_contacts`].
+//! Contact is not a sum of fixed elements: see [`ContactModel`] and [`BlockMatrix::add_contacts`].
 //!
 //! # Unknowns that are not only points
 //!
@@ -82,8 +82,8 @@ pub use linear::{
     OverRelaxation, SingularBlock, SingularPivot, SolveOptions, SolveReport, StopReason, bicgstab,
 };
 pub use matrix::{
-    BlockMatrix, Blocks, BorderedMatrix, Bsr, Csr, DofMap, KindMatrix, KindPattern, Pattern, Precision, Storage, dot,
-    index,
+    BlockMatrix, Blocks, BorderedMatrix, Bsr, CrossBlocks, Csr, DofMap, KindMatrix, KindPattern, Pattern, Precision,
+    Storage, dot, index,
 };
 pub use mixed::{
     ElementStates, Extremum, Inertia, MixedBody, MixedEnergy, MixedError, MixedIntegrator, MixedNewton,

@@ -1,9 +1,11 @@
-//! Contacts in over-relaxation: the same solution as a factorisation that has them in its pattern.
+//! Contacts in over-relaxation and multigrid: the same solution as a factorisation that has them in its pattern.
 
 use std::sync::Arc;
 
 use energy_dsl::{Block, Vector3};
-use energy_solve::{BlockCholesky, BlockMatrix, Contact, OverRelaxation, Pattern, SolveOptions, SolveReport, Storage};
+use energy_solve::{
+    BlockCholesky, BlockMatrix, Contact, Multigrid, OverRelaxation, Pattern, SolveOptions, SolveReport, Storage,
+};
 
 /// Rows of a chain whose neighbours are coupled.
 fn chain(rows: u32, contacts: &[Contact]) -> BlockMatrix {
@@ -56,12 +58,24 @@ fn right_hand_side(rows: u32) -> Vec<Vector3<f64>> {
 }
 
 fn solve(rows: u32, contacts: &[Contact], threads: usize, tolerance: f64) -> (Vec<Vector3<f64>>, SolveReport) {
-    let matrix = chain(rows, &[]);
+    let mut matrix = chain(rows, &[]);
     let mut solver = OverRelaxation::<f64>::with_threads(matrix.pattern(), threads);
-    solver.scale_with_contacts(&matrix, contacts).unwrap();
+    let added = matrix.add_contacts(&[contacts.to_vec()], 1.0, threads);
+    solver.scale_with(&matrix, &added.cross).unwrap();
     let mut x = vec![[0.0; 3]; rows as usize];
     let options = SolveOptions::new(tolerance);
     let report = solver.solve(&right_hand_side(rows), &mut x, &options);
+    assert!(report.converged(), "{report:?}");
+    (x, report)
+}
+
+fn solve_by_multigrid(rows: u32, contacts: &[Contact], threads: usize) -> (Vec<Vector3<f64>>, SolveReport) {
+    let mut matrix = chain(rows, &[]);
+    let mut solver = Multigrid::<f64>::with_threads(matrix.pattern(), threads);
+    let added = matrix.add_contacts(&[contacts.to_vec()], 1.0, threads);
+    solver.take_over_with(&matrix, &added.cross).unwrap();
+    let mut x = vec![[0.0; 3]; rows as usize];
+    let report = solver.solve(&right_hand_side(rows), &mut x, &SolveOptions::new(1e-12));
     assert!(report.converged(), "{report:?}");
     (x, report)
 }
@@ -97,15 +111,39 @@ fn contacts_are_part_of_the_sum() {
     let (found, _) = solve(120, &contacts, 1, 1e-12);
     assert_equal(&found, &expected(120, &contacts));
     // Without contacts the solution differs, and a solver forgets them.
-    let matrix = chain(120, &[]);
+    let mut matrix = chain(120, &[]);
     let mut solver = OverRelaxation::<f64>::new(matrix.pattern());
-    solver.scale_with_contacts(&matrix, &contacts).unwrap();
+    let added = matrix.add_contacts(&[contacts], 1.0, 1);
+    solver.scale_with(&matrix, &added.cross).unwrap();
+    matrix.remove_contacts(added);
     solver.scale(&matrix).unwrap();
     let mut x = vec![[0.0; 3]; 120];
     let options = SolveOptions::new(1e-12);
     assert!(solver.solve(&right_hand_side(120), &mut x, &options).converged());
     assert_equal(&x, &expected(120, &[]));
     assert!((x[5][0] - found[5][0]).abs() > 1e-3 * found[5][0].abs());
+}
+
+#[test]
+fn multigrid_takes_contacts_and_forgets_them() {
+    for stiffness in [1.0, 1e4] {
+        let contacts: Vec<_> = contacts(120, 40).into_iter().map(|contact| stiffer(contact, stiffness)).collect();
+        let (found, _) = solve_by_multigrid(120, &contacts, 1);
+        assert_equal(&found, &expected(120, &contacts));
+    }
+    let mut matrix = chain(120, &[]);
+    let mut solver = Multigrid::<f64>::new(matrix.pattern());
+    let added = matrix.add_contacts(&[contacts(120, 40)], 1.0, 1);
+    solver.take_over_with(&matrix, &added.cross).unwrap();
+    matrix.remove_contacts(added);
+    solver.take_over(&matrix).unwrap();
+    let mut x = vec![[0.0; 3]; 120];
+    assert!(solver.solve(&right_hand_side(120), &mut x, &SolveOptions::new(1e-12)).converged());
+    assert_equal(&x, &expected(120, &[]));
+}
+
+fn stiffer(contact: Contact, factor: f64) -> Contact {
+    Contact { block: contact.block.map(|row| row.map(|entry| factor * entry)), ..contact }
 }
 
 /// Enough rows for two domains, so that contacts act between them.
@@ -118,5 +156,9 @@ fn contacts_between_domains_are_bit_identical_on_any_number_of_threads() {
         let (many, again) = solve(ROWS, &contacts, threads, 1e-11);
         assert!(one == many && report == again, "{threads} threads");
     }
+    assert_equal(&one, &expected(ROWS, &contacts));
+    let (one, report) = solve_by_multigrid(ROWS, &contacts, 1);
+    let (many, again) = solve_by_multigrid(ROWS, &contacts, 3);
+    assert!(one == many && report == again);
     assert_equal(&one, &expected(ROWS, &contacts));
 }

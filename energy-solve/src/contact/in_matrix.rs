@@ -1,78 +1,86 @@
 use std::sync::Arc;
 
-use energy_dsl::Block;
-
 use super::Contact;
 use crate::matrix::block_matrix::{BlockMatrix, Contents};
+use crate::matrix::cross_blocks::{CrossBlocks, CrossEntry};
 use crate::matrix::pattern::{Pattern, Storage, index};
 use crate::matrix::precision::Precision;
 use crate::matrix::vector::add_scaled_block;
 use crate::threads::for_each;
 
-/// Contacts in a matrix whose pattern has all their blocks, such as those of a fixed obstacle with one triangle.
+/// Contacts added to a matrix. Blocks that its pattern has were added there.
 #[derive(Debug)]
 pub struct ContactsInMatrix<T> {
     /// The blocks before the contacts were added.
     replaced: Vec<Vec<Stored<T>>>,
     contents: Option<Arc<Contents>>,
-    /// The contacts that do not fit into the pattern, times the scale.
-    pub others: Vec<Contact>,
+    /// The blocks that the pattern lacks.
+    pub cross: CrossBlocks,
 }
 
 /// A block and its slot in a matrix.
 type Stored<T> = (u32, [[T; 3]; 3]);
 
-/// The pairs of corners of a stencil that a matrix stores, with the slots of their blocks.
-#[derive(Default)]
-struct Slots(Vec<(usize, usize, usize)>);
+/// The block of two corners of a contact.
+struct Pair {
+    corners: [usize; 2],
+    rows: [u32; 2],
+    /// Its slot, if the pattern has it.
+    slot: Option<usize>,
+}
 
-impl Slots {
-    /// Looks up the blocks of four rows. Returns whether the pattern has all of them.
-    fn find(&mut self, rows: [u32; 4], pattern: &Pattern) -> bool {
-        self.0.clear();
-        let free = || rows.into_iter().enumerate().filter(|(_, row)| *row != Contact::FIXED);
-        // An upper triangle stores each pair of rows once.
-        let is_stored = |row: u32, column: u32| pattern.storage() == Storage::Whole || row <= column;
-        let pairs = free().flat_map(|one| free().map(move |other| (one, other)));
-        pairs.filter(|((_, row), (_, column))| is_stored(*row, *column)).all(|((i, row), (j, column))| {
-            let found = pattern.slot(row as usize, column as usize);
-            self.0.extend(found.map(|(slot, _)| (i, j, slot)));
-            found.is_some()
-        })
+/// Lists the pairs of corners of four rows whose blocks a matrix of this pattern stores, or would.
+fn pairs(corners: [u32; 4], pattern: &Pattern, pairs: &mut Vec<Pair>) {
+    pairs.clear();
+    let free = || corners.into_iter().enumerate().filter(|(_, row)| *row != Contact::FIXED);
+    for (i, row) in free() {
+        // An upper triangle stores each pair of rows once, and so do blocks outside of the pattern.
+        for (j, column) in free().filter(|(_, column)| row <= *column || pattern.storage() == Storage::Whole) {
+            let slot = pattern.slot(row as usize, column as usize).map(|(slot, _)| slot);
+            if row <= column || slot.is_some() {
+                pairs.push(Pair { corners: [i, j], rows: [row, column], slot });
+            }
+        }
     }
 }
 
-/// Returns the blocks of the contacts that fit into a pattern, and the other contacts, all times a scale. Contacts of
-/// the same vertices that follow each other are summed.
-fn in_pattern<T: Precision>(contacts: &[Contact], scale: f64, pattern: &Pattern) -> (Vec<Stored<T>>, Vec<Contact>) {
-    let (mut stored, mut others) = (Vec::with_capacity(2 * contacts.len()), Vec::new());
-    let mut slots = Slots::default();
+/// Returns the blocks of the contacts that a pattern has, and the summands of the other ones, all times a scale.
+/// Contacts of the same vertices that follow each other are summed.
+fn located<'a, T: Precision>(
+    contacts: &'a [Contact],
+    scale: f64,
+    pattern: &Pattern,
+) -> (Vec<Stored<T>>, Vec<CrossEntry<'a>>) {
+    let (mut stored, mut cross) = (Vec::with_capacity(2 * contacts.len()), Vec::new());
+    let mut of_contact = Vec::new();
     for same in contacts.chunk_by(|one, other| one.rows == other.rows) {
-        if !slots.find(same[0].rows, pattern) {
-            let scaled = |block: Block<f64>| block.map(|row| row.map(|entry| scale * entry));
-            others.extend(same.iter().map(|contact| Contact { block: scaled(contact.block), ..*contact }));
-            continue;
-        }
-        for &(i, j, slot) in &slots.0 {
-            let mut sum = [[0.0; 3]; 3];
-            for Contact { weights, block, .. } in same {
-                add_scaled_block(&mut sum, scale * weights[i] * weights[j], block);
+        pairs(same[0].rows, pattern, &mut of_contact);
+        for &Pair { corners: [i, j], rows: [row, column], slot } in &of_contact {
+            let shares = same.iter().map(|contact| (scale * contact.weights[i] * contact.weights[j], &contact.block));
+            let shares = shares.filter(|(share, _)| *share != 0.0);
+            match slot {
+                Some(slot) => {
+                    let mut sum = [[0.0; 3]; 3];
+                    shares.for_each(|(share, block)| add_scaled_block(&mut sum, share, block));
+                    stored.push((index(slot), sum.map(|row| row.map(T::from_f64))));
+                }
+                None => cross.extend(shares.map(|(share, block)| CrossEntry { row, column, share, block })),
             }
-            stored.push((index(slot), sum.map(|row| row.map(T::from_f64))));
         }
     }
-    (stored, others)
+    (stored, cross)
 }
 
 impl<T: Precision> BlockMatrix<T> {
-    /// Adds lists of contacts, times a scale, if their blocks are all in the pattern. At most `threads` threads look
-    /// them up. Solvers then treat them like every other stiffness. No system may write to the matrix until
-    /// [`BlockMatrix::remove_contacts`] restores it exactly.
+    /// Adds lists of contacts, times a scale, wherever the pattern has their blocks, and returns the other blocks. At
+    /// most `threads` threads look them up. No system may write to the matrix until [`BlockMatrix::remove_contacts`]
+    /// restores it exactly.
     pub fn add_contacts(&mut self, contacts: &[Vec<Contact>], scale: f64, threads: usize) -> ContactsInMatrix<T> {
         let contents = self.take_contents();
         let pattern = &**self.pattern();
-        let parts = for_each(threads, contacts.iter().collect(), |part| in_pattern(part, scale, pattern));
-        let (mut replaced, others): (Vec<Vec<Stored<T>>>, Vec<_>) = parts.into_iter().unzip();
+        let rows = pattern.rows();
+        let parts = for_each(threads, contacts.iter().collect(), |part| located(part, scale, pattern));
+        let (mut replaced, cross): (Vec<Vec<Stored<T>>>, Vec<_>) = parts.into_iter().unzip();
         let values = self.values_and_nowhere();
         for (slot, block) in replaced.iter_mut().flatten() {
             let value = &mut values[*slot as usize];
@@ -83,7 +91,7 @@ impl<T: Precision> BlockMatrix<T> {
                 }
             }
         }
-        ContactsInMatrix { replaced, contents, others: others.concat() }
+        ContactsInMatrix { replaced, contents, cross: CrossBlocks::summed(rows, &cross) }
     }
 
     /// Restores the blocks that contacts were added to.
@@ -116,8 +124,19 @@ mod tests {
             let half = |contact: Contact| Contact { block: contact.block.map(|row| row.map(|e| 0.5 * e)), ..contact };
             let (fits, crosses) = (with([Contact::FIXED, 2, 0, 1]), with([0, 1, 2, 3]));
             let added = matrix.add_contacts(&[vec![half(fits)], vec![half(crosses)]], 2.0, 1);
-            assert_eq!(added.others, [crosses]);
-            for (row, column, c) in [(2, 2, 0.0625), (2, 0, 0.125), (0, 1, 0.125), (1, 2, 0.0625), (3, 3, 0.0)] {
+            // The pattern lacks rows 0 and 3 together.
+            let cross: Vec<_> = (0..4).flat_map(|row| added.cross.of_row(row).map(move |it| (row, it.1))).collect();
+            assert_eq!(cross, [(0, 3)]);
+            assert!((added.cross.blocks()[0][0][0] + 0.25 * 2.0).abs() < 1e-15);
+            // c of each of the two contacts at the row and the column, multiplied and summed.
+            let expected = [
+                (2, 2, 0.0625 + 0.25),
+                (2, 0, 0.125 - 0.5),
+                (0, 1, 0.125 - 0.25),
+                (1, 2, 0.0625 + 0.125),
+                (3, 3, 0.0625),
+            ];
+            for (row, column, c) in expected {
                 let change = matrix.block(row, column)[1][2] - before.block(row, column)[1][2];
                 assert!((change - 0.25 * c).abs() < 1e-4, "{row} {column}: {change}");
             }

@@ -2,7 +2,8 @@
 //!
 //! A [`Term`](crate::Term) has fixed stencils and a fixed matrix pattern. Pairs in contact change from iteration to
 //! iteration, so contact is not a term. A [`ContactStep`] lists the stiffness of the pairs in contact as [`Contact`]s
-//! instead, which solvers apply without a slot in the matrix.
+//! instead. They are added to the matrix where its pattern has their blocks, and solvers take the other blocks beside it
+//! ([`CrossBlocks`](crate::CrossBlocks)).
 
 mod block;
 mod in_matrix;
@@ -10,7 +11,6 @@ mod model;
 mod pressed;
 
 pub use block::Contact;
-pub(crate) use block::factors;
 pub use in_matrix::ContactsInMatrix;
 pub use model::{
     ContactCounts, ContactForces, ContactMemory, ContactModel, ContactStep, Resistance, SlidingStiffness, Touching,

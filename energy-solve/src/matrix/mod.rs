@@ -2,6 +2,7 @@
 
 pub(crate) mod block_matrix;
 pub(crate) mod bordered;
+pub(crate) mod cross_blocks;
 pub(crate) mod dof_map;
 mod export;
 pub(crate) mod kinds;
@@ -11,6 +12,7 @@ pub(crate) mod vector;
 
 pub use block_matrix::BlockMatrix;
 pub use bordered::BorderedMatrix;
+pub use cross_blocks::CrossBlocks;
 pub use dof_map::DofMap;
 pub use export::{Bsr, Csr};
 pub use kinds::{KindMatrix, KindPattern};

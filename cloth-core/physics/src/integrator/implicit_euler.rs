@@ -1,11 +1,11 @@
 use energy_dsl::Vector3;
 use energy_solve::{
-    BlockMatrix, Curvature, EvaluationError, LinearisationOptions, SolveOptions, SolveReport, State, StopReason,
-    Weights, bicgstab,
+    BlockMatrix, CrossBlocks, Curvature, EvaluationError, LinearisationOptions, SolveOptions, SolveReport, State,
+    StopReason, Weights, bicgstab,
 };
 
 use super::linear_solver::{LinearSolver, LinearSolverChoice, SolvedBy};
-use super::trial::Trial;
+use super::trial::Trials;
 use super::{Integrator, IntegratorMemory, StepError, StepReport, advance};
 use crate::body::Body;
 
@@ -24,7 +24,7 @@ use crate::body::Body;
 pub struct ImplicitEuler {
     options: Options,
     linear_solver: LinearSolverChoice,
-    trial: Trial,
+    trials: Trials,
     memory: Option<Memory>,
 }
 
@@ -81,8 +81,8 @@ impl ImplicitEuler {
         let unsymmetric = |report| (report, SolvedBy::default());
         let (report, solved_by) = match solver {
             None => unsymmetric(bicgstab(matrix, &rhs, &mut delta, options)?),
-            Some(solver) => match solver.prepare(matrix, &[], &self.trial) {
-                Ok(()) => solver.solve(&rhs, &mut delta, options, &mut self.trial),
+            Some(solver) => match solver.prepare(matrix, &CrossBlocks::default(), &mut self.trials) {
+                Ok(()) => solver.solve(&rhs, &mut delta, options, &mut self.trials),
                 // A diagonal block with negative curvature proves that the matrix is indefinite.
                 Err(_) if curvature == Curvature::Exact => unsymmetric(SolveReport::indefinite()),
                 Err(error) => return Err(error),
@@ -158,11 +158,11 @@ impl Integrator for ImplicitEuler {
     }
 
     fn memory(&self) -> IntegratorMemory {
-        IntegratorMemory { trial: self.trial, ..IntegratorMemory::default() }
+        IntegratorMemory { trials: self.trials, ..IntegratorMemory::default() }
     }
 
     fn restore(&mut self, memory: IntegratorMemory) {
-        self.trial = memory.trial;
+        self.trials = memory.trials;
     }
 
     fn stable_step(&self, _: &mut Body) -> Result<Option<f64>, EvaluationError> {

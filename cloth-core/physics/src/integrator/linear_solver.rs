@@ -2,13 +2,13 @@ use std::sync::Arc;
 
 use energy_dsl::Vector3;
 use energy_solve::{
-    BlockCholesky, BlockMatrix, Contact, Multigrid, OverRelaxation, Pattern, Precision, SolveOptions, SolveReport,
+    BlockCholesky, BlockMatrix, CrossBlocks, Multigrid, OverRelaxation, Pattern, Precision, SolveOptions, SolveReport,
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::StepError;
-use super::trial::Trial;
+use super::trial::Trials;
 
 /// The solver of the symmetric linear systems of implicit integrators.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
@@ -91,7 +91,7 @@ impl std::fmt::Display for SolvedBy {
 pub(super) struct LinearSolver<T> {
     choice: LinearSolverChoice,
     threads: usize,
-    /// Whether the prepared sum has contacts, whose solves say nothing about the solver for others.
+    /// Whether the prepared sum has contacts between rows that no element couples.
     in_contact: bool,
     /// The solver of the last matrix. Solvers of other kinds are set up again when needed, to save memory.
     solver: Option<Solver<T>>,
@@ -144,40 +144,42 @@ impl<T: Precision> LinearSolver<T> {
         Self { choice, threads, in_contact: false, solver: None }
     }
 
-    /// Prepares the solver for the sum of a matrix and contacts. Only over-relaxation takes contacts, so it replaces
-    /// every other choice while there are some.
+    /// Prepares the solver for the sum of a matrix and of the blocks of contacts that its pattern lacks. A factorisation
+    /// takes no such blocks: it gives way to the solvers of sheets while there are some.
     pub(super) fn prepare(
         &mut self,
         matrix: &BlockMatrix<impl Precision>,
-        contacts: &[Contact],
-        trial: &Trial,
+        cross: &CrossBlocks,
+        trials: &mut Trials,
     ) -> Result<(), StepError> {
         let (pattern, threads) = (matrix.pattern(), self.threads);
+        self.in_contact = !cross.is_empty();
         let wanted = match self.choice {
-            _ if !contacts.is_empty() => LinearSolverChoice::OverRelaxation,
-            LinearSolverChoice::Auto if trial.multigrid() => LinearSolverChoice::Multigrid,
-            LinearSolverChoice::Auto => LinearSolverChoice::OverRelaxation,
+            LinearSolverChoice::Cholesky if !self.in_contact => LinearSolverChoice::Cholesky,
+            LinearSolverChoice::Auto | LinearSolverChoice::Cholesky if trials.of(self.in_contact).multigrid() => {
+                LinearSolverChoice::Multigrid
+            }
+            LinearSolverChoice::Auto | LinearSolverChoice::Cholesky => LinearSolverChoice::OverRelaxation,
             choice => choice,
         };
-        self.in_contact = !contacts.is_empty();
         // Drop an unwanted solver before setting up another: memory for both may be lacking.
         let known = self.solver.take().filter(|solver| solver.choice() == wanted);
         let solver = known.map_or_else(|| Solver::set_up(wanted, pattern, threads), Ok)?;
         match self.solver.insert(solver) {
-            Solver::OverRelaxation(solver) => solver.scale_with_contacts(matrix, contacts)?,
-            Solver::Multigrid(solver) => solver.take_over(matrix)?,
+            Solver::OverRelaxation(solver) => solver.scale_with(matrix, cross)?,
+            Solver::Multigrid(solver) => solver.take_over_with(matrix, cross)?,
             Solver::Cholesky(solver) => solver.factor(matrix)?,
         }
         Ok(())
     }
 
-    /// Solves A x = b from x = 0, where A is the prepared matrix, and records the iterations in `trial`.
+    /// Solves A x = b from x = 0, where A is the prepared sum, and records the iterations in `trials`.
     pub(super) fn solve(
         &mut self,
         b: &[Vector3<f64>],
         x: &mut [Vector3<f64>],
         options: &SolveOptions,
-        trial: &mut Trial,
+        trials: &mut Trials,
     ) -> (SolveReport, SolvedBy) {
         let mut solved_by = SolvedBy::default();
         let report = match self.solver.as_mut().expect("a matrix was prepared") {
@@ -195,8 +197,10 @@ impl<T: Precision> LinearSolver<T> {
                 solver.solve(b, x)
             }
         };
-        if self.choice == LinearSolverChoice::Auto && !self.in_contact && report.converged() {
-            trial.record(report.iterations, options.relative_tolerance);
+        let is_chosen =
+            self.choice == LinearSolverChoice::Auto || self.choice == LinearSolverChoice::Cholesky && self.in_contact;
+        if is_chosen && report.converged() {
+            trials.of(self.in_contact).record(report.iterations, options.relative_tolerance);
         }
         (report, solved_by)
     }

@@ -83,7 +83,7 @@ pub struct IntegratorMemory {
     pub(crate) adaptive: [u32; 2],
     /// The linear solver in use, and the iteration counts that led to it.
     #[serde(default)]
-    pub(crate) trial: trial::Trial,
+    pub(crate) trials: trial::Trials,
     /// Data for the first iterate of [`Newton`]'s next step.
     #[serde(default)]
     pub(crate) warm_start: warm_start::WarmStart,

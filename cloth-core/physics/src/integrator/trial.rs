@@ -22,6 +22,21 @@ pub(crate) struct Trial {
     cycles: u32,
 }
 
+/// The choices for systems with and without contacts between rows that no element couples.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default)]
+pub(crate) struct Trials {
+    alone: Trial,
+    in_contact: Trial,
+}
+
+impl Trials {
+    /// Returns the choice for systems of one kind.
+    pub(super) fn of(&mut self, in_contact: bool) -> &mut Trial {
+        if in_contact { &mut self.in_contact } else { &mut self.alone }
+    }
+}
+
 /// Solves per round.
 const ROUND: u32 = 3;
 /// Rounds until the other solver is tried again.

@@ -6,6 +6,7 @@ use energy_dsl::{Level, Vector3};
 use super::triangle::{Triangle, scaled_block};
 use super::{InverseFactor, Precision, Wide, rounded};
 use crate::matrix::block_matrix::BlockMatrix;
+use crate::matrix::cross_blocks::CrossBlocks;
 use crate::matrix::pattern::{Pattern, index};
 use crate::matrix::precision::doubled;
 
@@ -24,7 +25,8 @@ pub(crate) struct Coupling<T> {
     /// The other domain, and the index of its row on its border.
     other: u32,
     border: u32,
-    /// The index of the block in the matrix, and its row and column there.
+    /// The index of the block in the matrix, or that of a block which the matrix lacks, counted from the matrix's
+    /// number of blocks; and its row and column there.
     slot: u32,
     between: [u32; 2],
     /// Whether the transpose of the stored block acts.
@@ -34,9 +36,10 @@ pub(crate) struct Coupling<T> {
 
 impl<T: Precision> Couplings<T> {
     /// Creates the couplings of all domains. The `ranges` of rows make up the pattern.
-    pub(super) fn all(pattern: &Pattern, ranges: &[Range<usize>], triangles: &[Triangle<T>]) -> Vec<Self> {
+    pub(super) fn all(pattern: &Pattern, cross: &CrossBlocks, triangles: &[&Triangle<T>]) -> Vec<Self> {
+        let ranges = &triangles.iter().map(|triangle| triangle.rows.clone()).collect::<Vec<_>>()[..];
         let mut all: Vec<Self> = ranges.iter().map(|_| Self { couplings: Vec::new(), border: Vec::new() }).collect();
-        let outer = outer_blocks(pattern, triangles);
+        let outer = outer_blocks(pattern, cross, triangles);
         for &(_, between) in &outer {
             for row in between {
                 let (domain, local) = local(ranges, row);
@@ -61,12 +64,24 @@ impl<T: Precision> Couplings<T> {
         &self.border
     }
 
+    /// Creates the place where other domains read the border rows of a vector.
+    pub(crate) fn create_border(&self) -> RwLock<Vec<Wide<T>>> {
+        RwLock::new(vec![[T::from_f64(0.0); 4]; self.border.len()])
+    }
+
     /// Returns Σ_j |e_ij| for each component of the border rows.
-    pub(crate) fn absolute_row_sums(&self, matrix: &BlockMatrix<impl Precision>) -> Vec<Vector3<f64>> {
+    pub(crate) fn absolute_row_sums(
+        &self,
+        matrix: &BlockMatrix<impl Precision>,
+        cross: &CrossBlocks,
+    ) -> Vec<Vector3<f64>> {
         let mut sums = vec![[0.0; 3]; self.border.len()];
         for coupling in &self.couplings {
             let border = self.border.binary_search(&coupling.row).expect("coupled rows are on the border");
-            let block = doubled(&matrix.values()[coupling.slot as usize]);
+            let block = match coupling.beyond(matrix) {
+                Some(beyond) => cross.blocks()[beyond],
+                None => doubled(&matrix.values()[coupling.slot as usize]),
+            };
             for i in 0..3 {
                 for j in 0..3 {
                     sums[border][i] += if coupling.transposed { block[j][i].abs() } else { block[i][j].abs() };
@@ -76,16 +91,27 @@ impl<T: Precision> Couplings<T> {
         sums
     }
 
-    /// Reads the coupling blocks of a matrix, scaled by C⁻¹ of each row.
+    /// Reads the coupling blocks of a matrix and of the blocks that it lacks, scaled by C⁻¹ of each row.
     #[inline(always)]
-    pub(crate) fn scale<M: Precision, L: Level>(&mut self, inverses: &[InverseFactor<T>], matrix: &BlockMatrix<M>) {
+    pub(crate) fn scale<M: Precision, L: Level>(
+        &mut self,
+        inverses: &[InverseFactor<T>],
+        matrix: &BlockMatrix<M>,
+        cross: &CrossBlocks,
+    ) {
         for coupling in &mut self.couplings {
-            let [row, column] = coupling.between.map(|row| rounded(&inverses[row as usize]));
-            let block = scaled_block::<M, L>(&row, &matrix.values()[coupling.slot as usize], &column);
+            let [row, column] = coupling.between.map(|row| &inverses[row as usize]);
+            let block = match coupling.beyond(matrix) {
+                Some(beyond) => scaled_block::<f64, L>(&rounded(row), &cross.blocks()[beyond], &rounded(column)),
+                None => {
+                    let stored = &matrix.values()[coupling.slot as usize];
+                    scaled_block::<M, L>(&rounded(row), stored, &rounded(column)).map(|row| row.map(Into::into))
+                }
+            };
             for i in 0..3 {
                 for j in 0..3 {
                     let entry = if coupling.transposed { block[j][i] } else { block[i][j] };
-                    coupling.columns[j][i] = T::from_f64(entry.into());
+                    coupling.columns[j][i] = T::from_f64(entry);
                 }
             }
         }
@@ -122,13 +148,26 @@ impl<T: Precision> Couplings<T> {
     }
 }
 
+impl<T> Coupling<T> {
+    /// Returns the index of the block among those that the matrix lacks; `None` if the matrix has it.
+    #[inline(always)]
+    fn beyond(&self, matrix: &BlockMatrix<impl Precision>) -> Option<usize> {
+        (self.slot as usize).checked_sub(matrix.pattern().blocks())
+    }
+}
+
 /// Returns the index, row and column of each block that couples two domains.
-fn outer_blocks<T>(pattern: &Pattern, triangles: &[Triangle<T>]) -> Vec<(usize, [usize; 2])> {
-    let of_row = |row: usize, inner_end: u32| (inner_end as usize..pattern.above(row).end).map(move |slot| (row, slot));
-    let blocks = triangles.iter().flat_map(|domain| {
-        domain.rows.clone().zip(&domain.inner_end).flat_map(move |(row, &inner_end)| of_row(row, inner_end))
-    });
-    blocks.map(|(row, slot)| (slot, [row, pattern.columns()[slot] as usize])).collect()
+fn outer_blocks<T>(pattern: &Pattern, cross: &CrossBlocks, triangles: &[&Triangle<T>]) -> Vec<(usize, [usize; 2])> {
+    let mut outer = Vec::new();
+    for Triangle { rows, inner_end, .. } in triangles {
+        for (row, &inner_end) in rows.clone().zip(inner_end) {
+            let slots = inner_end as usize..pattern.above(row).end;
+            outer.extend(slots.map(|slot| (slot, [row, pattern.columns()[slot] as usize])));
+            let beyond = cross.of_row(row).filter(|(_, column, _)| *column as usize >= rows.end);
+            outer.extend(beyond.map(|(number, column, _)| (pattern.blocks() + number, [row, column as usize])));
+        }
+    }
+    outer
 }
 
 /// Returns the domain of a row and the index of the row within it.

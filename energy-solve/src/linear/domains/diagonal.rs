@@ -5,7 +5,6 @@ use energy_dsl::{Block, Lane, Level, Mask, Vector3};
 use super::Wide;
 use crate::matrix::block_matrix::BlockMatrix;
 use crate::matrix::precision::{Precision, doubled};
-use crate::matrix::vector::add_scaled_block;
 
 /// C⁻¹ by columns, each padded with a zero, where C is lower triangular and C Cᵀ is a diagonal block or a multiple of
 /// it.
@@ -47,11 +46,9 @@ pub(crate) fn inverse_factor([[a, ..], [b, c, _], [d, e, f]]: &Block<f64>) -> Op
 const LANES: usize = 16;
 
 /// Computes C⁻¹ of some rows, with C Cᵀ = D/ω. Fails with the first row whose diagonal block is not positive definite.
-/// `added` holds a block for each row of the matrix to be added to D; empty for none.
 #[inline(always)]
 pub(crate) fn invert<T: Precision, M: Precision, L: Level>(
     matrix: &BlockMatrix<M>,
-    added: &[Block<f64>],
     rows: Range<usize>,
     relaxation: f64,
     inverses: &mut [InverseFactor<T>],
@@ -61,11 +58,7 @@ pub(crate) fn invert<T: Precision, M: Precision, L: Level>(
         // Unused lanes hold unit matrices.
         let mut numbers = [[1.0; LANES], [0.0; LANES], [1.0; LANES], [0.0; LANES], [0.0; LANES], [1.0; LANES]];
         for lane in 0..inverses.len() {
-            let mut block = doubled(matrix.diagonal(row + lane));
-            if let Some(added) = added.get(row + lane) {
-                add_scaled_block(&mut block, 1.0, added);
-            }
-            let [[a, ..], [b, c, _], [d, e, f]] = block;
+            let [[a, ..], [b, c, _], [d, e, f]] = doubled(matrix.diagonal(row + lane));
             for (entry, number) in [a, b, c, d, e, f].into_iter().enumerate() {
                 numbers[entry][lane] = number;
             }
@@ -140,7 +133,7 @@ mod tests {
         type Output = Result<(), usize>;
 
         fn run<L: Level>(self) -> Self::Output {
-            invert::<f64, f64, L>(self.0, &[], 0..11, RELAXATION, self.1)
+            invert::<f64, f64, L>(self.0, 0..11, RELAXATION, self.1)
         }
     }
     /// 11 rows: full registers and a remainder.

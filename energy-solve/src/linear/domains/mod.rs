@@ -3,7 +3,6 @@
 //! Threads relax domains independently, exchange the vectors on their borders, and meet at barriers. The domains depend
 //! on the matrix alone, never on the number of threads, so that results do not either.
 
-mod contacts;
 mod couplings;
 mod diagonal;
 mod per_domain;
@@ -15,9 +14,9 @@ use std::ops::Range;
 use energy_dsl::{BLOCK_NUMBERS, BlockSum, Kernel, Level};
 
 use crate::matrix::block_matrix::BlockMatrix;
+use crate::matrix::cross_blocks::CrossBlocks;
 use crate::matrix::pattern::Pattern;
 
-pub(crate) use self::contacts::{DomainContacts, contact_diagonals, distribute};
 pub(crate) use self::couplings::Couplings;
 pub(crate) use self::diagonal::{InverseFactor, inverse_factor, invert, rounded, scaled, unscaled};
 pub(crate) use self::per_domain::PerDomain;
@@ -44,16 +43,34 @@ pub(crate) fn create_domains<T: Precision>(
     ranges: &[Range<usize>],
 ) -> Vec<(Triangle<T>, Couplings<T>)> {
     let triangles: Vec<_> = ranges.iter().map(|rows| Triangle::new(pattern, rows.clone())).collect();
-    let couplings = Couplings::all(pattern, ranges, &triangles);
+    let couplings = Couplings::all(pattern, &CrossBlocks::default(), &triangles.iter().collect::<Vec<_>>());
     triangles.into_iter().zip(couplings).collect()
 }
 
-/// Reads a domain's part of a matrix, scaled by C⁻¹ of each row.
+/// Lets the domains take blocks that the pattern lacks: all of the next matrix, in place of those of the last.
+pub(crate) fn extend<'a, T: Precision + 'a>(
+    domains: impl Iterator<Item = (&'a mut Triangle<T>, &'a mut Couplings<T>)>,
+    pattern: &Pattern,
+    cross: &CrossBlocks,
+) {
+    let (mut triangles, couplings): (Vec<_>, Vec<_>) = domains.unzip();
+    if cross.is_empty() && triangles.iter().all(|triangle| !triangle.is_extended()) {
+        return;
+    }
+    triangles.iter_mut().for_each(|triangle| triangle.extend(pattern, cross));
+    let triangles: Vec<_> = triangles.iter().map(|triangle| &**triangle).collect();
+    for (couplings, extended) in couplings.into_iter().zip(Couplings::all(pattern, cross, &triangles)) {
+        *couplings = extended;
+    }
+}
+
+/// Reads a domain's part of a matrix and of the blocks that it lacks, scaled by C⁻¹ of each row.
 pub(crate) struct Scaling<'a, T, M> {
     pub(crate) triangle: &'a mut Triangle<T>,
     pub(crate) couplings: &'a mut Couplings<T>,
     pub(crate) inverses: &'a [InverseFactor<T>],
     pub(crate) matrix: &'a BlockMatrix<M>,
+    pub(crate) cross: &'a CrossBlocks,
 }
 
 impl<T: Precision, M: Precision> Kernel for Scaling<'_, T, M> {
@@ -61,8 +78,8 @@ impl<T: Precision, M: Precision> Kernel for Scaling<'_, T, M> {
 
     #[inline(always)]
     fn run<L: Level>(self) {
-        self.triangle.scale::<M, L>(self.inverses, self.matrix);
-        self.couplings.scale::<M, L>(self.inverses, self.matrix);
+        self.triangle.scale::<M, L>(self.inverses, self.matrix, self.cross);
+        self.couplings.scale::<M, L>(self.inverses, self.matrix, self.cross);
     }
 }
 

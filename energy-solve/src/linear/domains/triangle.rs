@@ -4,6 +4,7 @@ use energy_dsl::{BLOCK_NUMBERS, Block, Level};
 
 use super::{InverseFactor, Precision, Wide, keep_vector, rounded};
 use crate::matrix::block_matrix::BlockMatrix;
+use crate::matrix::cross_blocks::CrossBlocks;
 use crate::matrix::pattern::{Pattern, index};
 
 /// Padding after a block's nine numbers, which is read and ignored; see [`BlockSum`](energy_dsl::BlockSum).
@@ -20,6 +21,17 @@ pub(crate) struct Triangle<T> {
     pub(super) inner_end: Vec<u32>,
     /// The blocks, each row by row.
     numbers: Vec<T>,
+    /// Where the blocks are if there are more than those of the pattern.
+    extended: Option<Extended>,
+}
+
+/// The places of a domain's blocks, laid out as in a [`Pattern`]: each row has its diagonal, the pattern's blocks, and
+/// then those that the pattern lacks.
+#[derive(Clone, Debug)]
+struct Extended {
+    columns: Vec<u32>,
+    diagonals: Vec<u32>,
+    inner_end: Vec<u32>,
 }
 
 /// The data of a [`Triangle`] that a sweep reads.
@@ -79,7 +91,26 @@ impl<T: Precision> Triangle<T> {
         let last = rows.end - 1;
         let blocks = pattern.above(last).end - last - 1 - before(rows.start);
         let numbers = vec![T::from_f64(0.0); 9 * blocks + SLACK];
-        Self { blocks_before: before(rows.start), inner_end: inner_end.collect(), rows, numbers }
+        let inner_end = inner_end.collect();
+        Self { blocks_before: before(rows.start), inner_end, rows, numbers, extended: None }
+    }
+
+    /// Whether it has room for blocks that the pattern lacks.
+    pub(super) fn is_extended(&self) -> bool {
+        self.extended.is_some()
+    }
+
+    /// Makes room for blocks that the pattern lacks, or takes it back if there are none.
+    pub(super) fn extend(&mut self, pattern: &Pattern, cross: &CrossBlocks) {
+        let Self { rows, extended, numbers, .. } = self;
+        let blocks = if cross.is_empty() {
+            *extended = None;
+            pattern.above(rows.end - 1).end - rows.end - self.blocks_before
+        } else {
+            let places = extended.insert(Extended::new(pattern, rows.clone(), &self.inner_end, cross));
+            places.columns.len() - places.diagonals.len()
+        };
+        numbers.resize(9 * blocks + SLACK, T::from_f64(0.0));
     }
 
     /// Returns the indices, in the pattern, of the blocks that couple a row with later rows of the domain.
@@ -91,6 +122,9 @@ impl<T: Precision> Triangle<T> {
     /// Returns the blocks by rows, for sweeps.
     #[inline(always)]
     pub(crate) fn by_rows<'a>(&'a self, pattern: &'a Pattern) -> Rows<'a, T> {
+        if let Some(Extended { columns, diagonals, inner_end }) = &self.extended {
+            return Rows { numbers: &self.numbers, columns, diagonals, inner_end, first: self.rows.start, before: 0 };
+        }
         Rows {
             numbers: &self.numbers,
             columns: pattern.columns(),
@@ -101,20 +135,55 @@ impl<T: Precision> Triangle<T> {
         }
     }
 
-    /// Reads the domain's blocks of a matrix, scaled by C⁻¹ of each row.
+    /// Reads the domain's blocks of a matrix and of the blocks that it lacks, scaled by C⁻¹ of each row.
     #[inline(always)]
-    pub(crate) fn scale<M: Precision, L: Level>(&mut self, inverses: &[InverseFactor<T>], matrix: &BlockMatrix<M>) {
+    pub(crate) fn scale<M: Precision, L: Level>(
+        &mut self,
+        inverses: &[InverseFactor<T>],
+        matrix: &BlockMatrix<M>,
+        cross: &CrossBlocks,
+    ) {
         let (pattern, values) = (matrix.pattern(), matrix.values());
         for (local, row) in self.rows.clone().enumerate() {
             let own = rounded(&inverses[row]);
-            let mut first = 9 * (pattern.diagonal(row) - row - self.blocks_before);
+            let mut first = match &self.extended {
+                Some(Extended { diagonals, .. }) => 9 * (diagonals[local] as usize - local),
+                None => 9 * (pattern.diagonal(row) - row - self.blocks_before),
+            };
             for slot in self.slots(pattern, local) {
                 let other = rounded(&inverses[pattern.columns()[slot] as usize]);
                 let rows = scaled_block::<M, L>(&own, &values[slot], &other);
                 store(&mut self.numbers[first..][..10], &rows);
                 first += 9;
             }
+            if self.extended.is_some() {
+                let own = rounded(&inverses[row]);
+                for (_, column, block) in inner(cross, row, self.rows.end) {
+                    let rows = scaled_block::<f64, L>(&own, block, &rounded(&inverses[column as usize]));
+                    store(&mut self.numbers[first..][..10], &rows);
+                    first += 9;
+                }
+            }
         }
+    }
+}
+
+/// Returns the blocks of a row whose columns are before the end of the domain.
+#[inline(always)]
+fn inner(cross: &CrossBlocks, row: usize, end: usize) -> impl Iterator<Item = (usize, u32, &Block<f64>)> {
+    cross.of_row(row).take_while(move |(_, column, _)| (*column as usize) < end)
+}
+
+impl Extended {
+    fn new(pattern: &Pattern, rows: Range<usize>, pattern_ends: &[u32], cross: &CrossBlocks) -> Self {
+        let (mut columns, mut diagonals, mut inner_end) = (Vec::new(), Vec::new(), Vec::new());
+        for (row, &end) in rows.clone().zip(pattern_ends) {
+            diagonals.push(index(columns.len()));
+            columns.extend_from_slice(&pattern.columns()[pattern.diagonal(row)..end as usize]);
+            columns.extend(inner(cross, row, rows.end).map(|(_, column, _)| column));
+            inner_end.push(index(columns.len()));
+        }
+        Self { columns, diagonals, inner_end }
     }
 }
 

@@ -3,13 +3,14 @@ use std::sync::Arc;
 
 use energy_dsl::{Kernel, Level, Vector3, dispatch};
 
-use super::galerkin::GalerkinProduct;
+use super::galerkin::{GalerkinProduct, add_product};
 use super::interpolation::Interpolation;
 use super::smoother::{Inversion, Smoother};
 use crate::linear::domains::{InverseFactor, Precision, Scaling, Wide, create_domains, scaled, unscaled};
 use crate::linear::sparse_factor::SparseFactor;
 use crate::matrix::block_matrix::BlockMatrix;
-use crate::matrix::pattern::Pattern;
+use crate::matrix::cross_blocks::CrossBlocks;
+use crate::matrix::pattern::{Pattern, Storage, index};
 use crate::matrix::vector::widened;
 
 /// The largest number of rows of the coarsest level, which is factored. Levels whose rows cannot be
@@ -32,7 +33,11 @@ pub(super) struct Coarse<T> {
 
 #[derive(Clone, Debug)]
 enum Inverse<T> {
-    Direct(Box<SparseFactor>),
+    /// The factor of a matrix that has all blocks.
+    Direct {
+        factor: Box<SparseFactor>,
+        matrix: BlockMatrix,
+    },
     Cycle(Box<Relaxed<T>>),
 }
 
@@ -61,7 +66,11 @@ impl<T: Precision> Coarse<T> {
         let rows = product.pattern().rows();
         let zeros = vec![[T::from_f64(0.0); 4]; rows];
         let inverse = if rows <= COARSEST {
-            Inverse::Direct(SparseFactor::new(3, product.pattern()).ok()?.into())
+            // Contacts may couple any rows.
+            let all: Vec<u32> = (0..index(rows)).collect();
+            let complete = Arc::new(Pattern::from_stencils(Storage::Upper, rows, [&all[..]]));
+            let factor = SparseFactor::new(3, &complete).ok()?.into();
+            Inverse::Direct { factor, matrix: BlockMatrix::zeros(complete) }
         } else {
             Inverse::Cycle(Box::new(Relaxed::new(product.pattern())))
         };
@@ -79,14 +88,23 @@ impl<T: Precision> Coarse<T> {
         blocks
     }
 
-    /// Reads a matrix of the finer level. `None` if the matrix proves not to be positive definite.
-    pub(super) fn take_over(&mut self, fine: &BlockMatrix<impl Precision>, unit: f64, threads: usize) -> Option<()> {
-        let matrix = self.product.compute(fine, &self.interpolation, threads);
+    /// Reads a matrix of the finer level and the blocks that it lacks. `None` if the sum proves not to be positive
+    /// definite.
+    pub(super) fn take_over(
+        &mut self,
+        fine: &BlockMatrix<impl Precision>,
+        cross: &CrossBlocks,
+        unit: f64,
+        threads: usize,
+    ) -> Option<()> {
+        let mut product = self.product.compute(fine, &self.interpolation, threads);
+        let cross = add_product(cross, &self.interpolation, &mut product);
         match &mut self.inverse {
-            Inverse::Direct(factor) => {
+            Inverse::Direct { factor, matrix } => {
+                expand(&product, &cross, matrix);
                 factor.factor(0.0, |block, i, j| unit * unit * matrix.values()[block][i][j]).ok()
             }
-            Inverse::Cycle(relaxed) => relaxed.take_over(&matrix, unit),
+            Inverse::Cycle(relaxed) => relaxed.take_over(&product, &cross, unit),
         }
     }
 
@@ -94,7 +112,7 @@ impl<T: Precision> Coarse<T> {
     /// preconditioning requires.
     pub(super) fn correct(&mut self) {
         match &mut self.inverse {
-            Inverse::Direct(factor) => {
+            Inverse::Direct { factor, .. } => {
                 let numbers = self.restricted.iter().flat_map(|&[u, v, w, _]| [u, v, w]).map(Into::into);
                 let mut e: Vec<f64> = numbers.collect();
                 factor.solve(&mut e);
@@ -125,13 +143,14 @@ impl<T: Precision> Relaxed<T> {
         }
     }
 
-    fn take_over(&mut self, matrix: &BlockMatrix, unit: f64) -> Option<()> {
+    fn take_over(&mut self, matrix: &BlockMatrix, cross: &CrossBlocks, unit: f64) -> Option<()> {
         self.unit = unit;
         let Self { smoother, inverses, .. } = self;
-        dispatch(Inversion { smoother, inverses, matrix, unit }).ok()?;
+        smoother.extend(matrix.pattern(), cross);
+        dispatch(Inversion { smoother, inverses, matrix, cross, unit }).ok()?;
         let Smoother { triangle, couplings, .. } = smoother;
-        dispatch(Scaling { triangle, couplings, inverses, matrix });
-        self.next.as_mut().map_or(Some(()), |next| next.take_over(matrix, unit, 1))
+        dispatch(Scaling { triangle, couplings, inverses, matrix, cross });
+        self.next.as_mut().map_or(Some(()), |next| next.take_over(matrix, cross, unit, 1))
     }
 
     fn cycle(&mut self, pattern: &Arc<Pattern>, restricted: &[Wide<T>], correction: &mut [Wide<T>]) {
@@ -152,6 +171,20 @@ impl<T: Precision> Relaxed<T> {
             let [u, v, w, _] = self.solution[row];
             let z: Vector3<f64> = [u, v, w].map(|component| back * Into::<f64>::into(component));
             *e = widened(unscaled(&self.inverses[row], &z));
+        }
+    }
+}
+
+/// Writes a matrix and the blocks that it lacks to one that has all blocks.
+fn expand(matrix: &BlockMatrix, cross: &CrossBlocks, complete: &mut BlockMatrix) {
+    let pattern = Arc::clone(complete.pattern());
+    complete.values_mut().fill([[0.0; 3]; 3]);
+    for row in 0..pattern.rows() {
+        let stored = matrix.pattern().row(row).map(|(slot, column)| (column, &matrix.values()[slot]));
+        let lacking = cross.of_row(row).map(|(_, column, block)| (column as usize, block));
+        for (column, block) in stored.chain(lacking) {
+            let (slot, _) = pattern.slot(row, column).expect("the pattern has all blocks");
+            complete.values_mut()[slot] = *block;
         }
     }
 }

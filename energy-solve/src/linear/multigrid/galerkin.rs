@@ -1,12 +1,14 @@
 use std::ops::Range;
 use std::sync::Arc;
 
-use energy_dsl::{Kernel, Level, Number, dispatch};
+use energy_dsl::{Block, Kernel, Level, Number, dispatch};
 
 use super::interpolation::Interpolation;
 use crate::linear::domains::Precision;
 use crate::matrix::block_matrix::BlockMatrix;
+use crate::matrix::cross_blocks::{CrossBlocks, CrossEntry};
 use crate::matrix::pattern::{Pattern, Storage, index};
+use crate::matrix::vector::{add_scaled_block, transposed};
 use crate::threads::for_each;
 
 /// Pᵀ A P for matrices A of one pattern. The scatter maps of the product are computed once.
@@ -201,6 +203,69 @@ fn add_times<M: Precision, L: Level>(sum: &mut Half, scale: f64, block: &[M; 9])
     }
 }
 
+/// A block, by its number in a list, that is added to one above the diagonal of a product.
+struct Summand {
+    row: u32,
+    column: u32,
+    weight: f64,
+    block: usize,
+}
+
+/// Adds Pᵀ (X + Xᵀ) P to a product, where X holds the blocks that the fine matrix lacks. Returns the blocks that the
+/// product lacks.
+pub(super) fn add_product<T: Precision>(
+    cross: &CrossBlocks,
+    interpolation: &Interpolation<T>,
+    product: &mut BlockMatrix,
+) -> CrossBlocks {
+    let rows = product.pattern().rows();
+    // The blocks of X P, each followed by its transpose, and the places of the product to which they add.
+    let (mut blocks, mut summands): (Vec<Block<f64>>, Vec<Summand>) = (Vec::new(), Vec::new());
+    let mut of_row: Vec<(u32, Block<f64>)> = Vec::new();
+    for row in 0..interpolation.rows() {
+        of_row.clear();
+        for (_, column, block) in cross.of_row(row) {
+            for (aggregate, weight) in interpolation.weighted(column as usize) {
+                let known = of_row.iter().position(|(known, _)| *known == aggregate).unwrap_or_else(|| {
+                    of_row.push((aggregate, [[0.0; 3]; 3]));
+                    of_row.len() - 1
+                });
+                add_scaled_block(&mut of_row[known].1, weight, block);
+            }
+        }
+        for (own, weight) in interpolation.weighted(row) {
+            for (number, (other, block)) in of_row.iter().enumerate() {
+                if own == *other {
+                    let diagonal = product.diagonal_mut(own as usize);
+                    add_scaled_block(diagonal, weight, block);
+                    add_scaled_block(diagonal, weight, &transposed(block));
+                } else {
+                    let block = blocks.len() + 2 * number + usize::from(own > *other);
+                    summands.push(Summand { row: own.min(*other), column: own.max(*other), weight, block });
+                }
+            }
+        }
+        blocks.extend(of_row.iter().flat_map(|(_, block)| [*block, transposed(block)]));
+    }
+    let entry = |&Summand { row, column, weight, block }: &Summand| CrossEntry {
+        row,
+        column,
+        share: weight,
+        block: &blocks[block],
+    };
+    let sums = CrossBlocks::summed(rows, &[summands.iter().map(entry).collect()]);
+    let mut beyond = Vec::new();
+    for row in 0..rows {
+        for (_, column, block) in sums.of_row(row) {
+            match product.pattern().slot(row, column as usize) {
+                Some((slot, _)) => add_scaled_block(&mut product.values_mut()[slot], 1.0, block),
+                None => beyond.push(CrossEntry { row: index(row), column, share: 1.0, block }),
+            }
+        }
+    }
+    CrossBlocks::summed(rows, &[beyond])
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -220,6 +285,13 @@ mod tests {
         DMatrix::from_fn(rows, rows, |i, j| matrix.block(i / 3, j / 3)[i % 3][j % 3])
     }
 
+    fn dense_interpolation(interpolation: &Interpolation<f64>) -> DMatrix<f64> {
+        DMatrix::from_fn(3 * interpolation.rows(), 3 * interpolation.aggregates(), |i, j| {
+            let carries = interpolation.weighted(i / 3).find(|(aggregate, _)| *aggregate as usize == j / 3);
+            carries.map_or(0.0, |(_, weight)| if i % 3 == j % 3 { weight } else { 0.0 })
+        })
+    }
+
     #[test]
     fn the_galerkin_product_is_the_dense_product() {
         let pattern = Arc::new(grid(11));
@@ -233,10 +305,7 @@ mod tests {
             *fine.diagonal_mut(row) = std::array::from_fn(|i| std::array::from_fn(|j| block[i.min(j)][i.max(j)]));
         }
         let interpolation = Interpolation::<f64>::averaged(&pattern);
-        let p = DMatrix::from_fn(3 * pattern.rows(), 3 * interpolation.aggregates(), |i, j| {
-            let carries = interpolation.columns(i / 3).iter().position(|&aggregate| aggregate as usize == j / 3);
-            carries.map_or(0.0, |entry| if i % 3 == j % 3 { interpolation.weights(i / 3)[entry] } else { 0.0 })
-        });
+        let p = dense_interpolation(&interpolation);
         let expected = p.transpose() * dense(&fine) * &p;
         for bounds in [[0, 122].as_slice(), &[0, 50, 80, 122]] {
             let ranges: Vec<_> = bounds.windows(2).map(|ends| ends[0]..ends[1]).collect();
@@ -246,6 +315,46 @@ mod tests {
                 assert!((dense(&computed) - &expected).amax() < 1e-13);
             }
         }
+    }
+
+    #[test]
+    fn blocks_beyond_the_pattern_are_part_of_the_product() {
+        let pattern = Arc::new(grid(11));
+        let rows = pattern.rows();
+        let interpolation = Interpolation::<f64>::averaged(&pattern);
+        let product = GalerkinProduct::new(&pattern, &interpolation, &[Range { start: 0, end: rows }]).unwrap();
+        let mut random = fastrand::Rng::with_seed(7);
+        // Far from each other, and near enough to fall into one aggregate or into two that are coupled.
+        let mut places = Vec::new();
+        for number in 0..60 {
+            let row = random.usize(0..rows - 40);
+            let column = row + if number % 2 == 0 { random.usize(2..5) } else { random.usize(14..40) };
+            if pattern.slot(row, column).is_none() {
+                let block: Block<f64> = std::array::from_fn(|_| std::array::from_fn(|_| random.f64() - 0.5));
+                places.push((index(row), index(column), block));
+            }
+        }
+        let entries =
+            places.iter().map(|(row, column, block)| CrossEntry { row: *row, column: *column, share: 1.0, block });
+        let cross = CrossBlocks::summed(rows, &[entries.collect()]);
+        let mut coarse = product.compute(&BlockMatrix::<f64>::zeros(Arc::clone(&pattern)), &interpolation, 1);
+        let beyond = add_product(&cross, &interpolation, &mut coarse);
+        assert!(!beyond.is_empty() && beyond.len() < cross.len() * 9);
+        let expand = |matrix: DMatrix<f64>, cross: &CrossBlocks| {
+            let mut sum = matrix;
+            for row in 0..sum.nrows() / 3 {
+                for (_, column, block) in cross.of_row(row) {
+                    for (i, j) in (0..9).map(|number| (number / 3, number % 3)) {
+                        sum[(3 * row + i, 3 * column as usize + j)] += block[i][j];
+                        sum[(3 * column as usize + j, 3 * row + i)] += block[i][j];
+                    }
+                }
+            }
+            sum
+        };
+        let p = dense_interpolation(&interpolation);
+        let expected = p.transpose() * expand(DMatrix::zeros(3 * rows, 3 * rows), &cross) * &p;
+        assert!((expand(dense(&coarse), &beyond) - expected).amax() < 1e-13);
     }
 
     #[test]

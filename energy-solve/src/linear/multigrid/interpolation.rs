@@ -70,6 +70,17 @@ impl<T: Precision> Interpolation<T> {
         self.aggregates
     }
 
+    /// Returns the number of rows that are interpolated.
+    pub(super) fn rows(&self) -> usize {
+        self.row_start.len() - 1
+    }
+
+    /// Iterates over the aggregates from which a row is interpolated, with their weights.
+    #[inline(always)]
+    pub(super) fn weighted(&self, row: usize) -> impl Iterator<Item = (u32, f64)> {
+        self.columns(row).iter().copied().zip(self.weights(row).iter().map(|&weight| weight.into()))
+    }
+
     /// Returns the indices of a row's weights.
     #[inline(always)]
     pub(super) fn entries(&self, row: usize) -> Range<usize> {

@@ -12,9 +12,10 @@ use self::coarse::Coarse;
 use self::gradients::{Common, Gradients, Part, Vectors};
 use self::smoother::{Inversion, Smoother};
 use crate::linear::conjugate_gradients::conjugate_gradients;
-use crate::linear::domains::{InverseFactor, Precision, Scaling, create_domains, ranges};
+use crate::linear::domains::{InverseFactor, Precision, Scaling, create_domains, extend, ranges};
 use crate::linear::solve::{SingularBlock, SolveOptions, SolveReport, StopReason};
 use crate::matrix::block_matrix::BlockMatrix;
+use crate::matrix::cross_blocks::CrossBlocks;
 use crate::matrix::pattern::{Pattern, Storage};
 use crate::threads::{for_each, in_parts, split_mut};
 
@@ -144,20 +145,39 @@ impl<T: Precision> Multigrid<T> {
     /// # Panics
     /// If the matrix has another pattern.
     pub fn take_over(&mut self, matrix: &BlockMatrix<impl Precision>) -> Result<(), SingularBlock> {
+        self.take_over_with(matrix, &CrossBlocks::default())
+    }
+
+    /// Reads the sum of a matrix of the pattern and of blocks that the pattern lacks, such as those of contacts, and
+    /// computes the smoothers and Galerkin products of all levels.
+    ///
+    /// # Errors
+    /// If a diagonal block is not positive definite, in which case neither is the sum.
+    ///
+    /// # Panics
+    /// If the matrix has another pattern.
+    pub fn take_over_with(
+        &mut self,
+        matrix: &BlockMatrix<impl Precision>,
+        cross: &CrossBlocks,
+    ) -> Result<(), SingularBlock> {
         assert!(Arc::ptr_eq(&self.pattern, matrix.pattern()), "the matrix has another pattern");
         let Self { pattern, threads, inverses, smoothers, coarse, .. } = self;
+        let domains = smoothers.iter_mut().map(|smoother| (&mut smoother.triangle, &mut smoother.couplings));
+        extend(domains, pattern, cross);
         let largest = (0..pattern.rows()).map(|row| matrix.diagonal(row)[0][0].into()).fold(0.0, f64::max);
         let unit = if largest > 0.0 { largest.sqrt().power_of_two_scale() } else { 1.0 };
         let lengths: Vec<usize> = smoothers.iter().map(|smoother| smoother.triangle.rows.len()).collect();
         let parts = smoothers.iter_mut().zip(split_mut(inverses, lengths)).collect();
-        let invert = |(smoother, inverses)| dispatch(Inversion { smoother, inverses, matrix, unit });
+        let invert = |(smoother, inverses)| dispatch(Inversion { smoother, inverses, matrix, cross, unit });
         let inverted: Result<(), usize> = for_each(*threads, parts, invert).into_iter().collect();
         inverted.map_err(|row| SingularBlock { row })?;
         let inverses = &**inverses;
         for_each(*threads, smoothers.iter_mut().collect(), |Smoother { triangle, couplings, .. }| {
-            dispatch(Scaling { triangle, couplings, inverses, matrix });
+            dispatch(Scaling { triangle, couplings, inverses, matrix, cross });
         });
-        self.definite = coarse.as_mut().is_none_or(|coarse| coarse.take_over(matrix, unit, *threads).is_some());
+        let positive = |coarse: &mut Coarse<T>| coarse.take_over(matrix, cross, unit, *threads).is_some();
+        self.definite = coarse.as_mut().is_none_or(positive);
         Ok(())
     }
 

@@ -2,10 +2,9 @@ use std::sync::RwLock;
 
 use energy_dsl::{Level, Vector3};
 
-use super::RELAXATION;
 use crate::linear::domains::{
-    Couplings, DomainContacts, InverseFactor, Precision, Triangle, Wide, add_products, minus_products, scaled,
-    subtract_transposed, sum_of_three, unscaled,
+    Couplings, InverseFactor, Precision, Triangle, Wide, add_products, minus_products, scaled, subtract_transposed,
+    sum_of_three, unscaled,
 };
 use crate::matrix::pattern::Pattern;
 
@@ -15,7 +14,6 @@ pub(super) struct Domain<T> {
     pub(super) triangle: Triangle<T>,
     /// Ẽ, the couplings with other domains.
     pub(super) couplings: Couplings<T>,
-    pub(super) contacts: DomainContacts<T>,
     residual: Vec<Wide<T>>,
     direction: Vec<Wide<T>>,
     /// t = (I + L̃ᵀ)⁻¹ p.
@@ -32,7 +30,6 @@ impl<T: Precision> Domain<T> {
         Self {
             triangle,
             couplings,
-            contacts: DomainContacts::default(),
             residual: zeros.clone(),
             direction: zeros.clone(),
             backward_solution: zeros.clone(),
@@ -72,11 +69,11 @@ impl<T: Precision> Domain<T> {
     pub(super) fn backward<L: Level>(
         &mut self,
         pattern: &Pattern,
+        relaxation: f64,
         conjugate: f64,
         border: &RwLock<Vec<Wide<T>>>,
-        contact_border: Option<&RwLock<Vec<Wide<T>>>>,
     ) -> f64 {
-        let (conjugate, rest) = (T::from_f64(conjugate), T::from_f64(RELAXATION - 2.0));
+        let (conjugate, rest) = (T::from_f64(conjugate), T::from_f64(relaxation - 2.0));
         let rows = self.triangle.by_rows(pattern);
         let (r, p, t, w) = (
             &self.residual[..],
@@ -100,19 +97,13 @@ impl<T: Precision> Domain<T> {
             (t[row], w[row]) = (back, start);
         }
         self.couplings.publish(&self.backward_solution, border);
-        self.contacts.publish(&self.backward_solution, contact_border);
         sum_of_three(along)
     }
 
-    /// w ← w + Ẽ t, where Ẽ includes the contacts.
+    /// w ← w + Ẽ t.
     #[inline(always)]
-    pub(super) fn couple<L: Level>(
-        &mut self,
-        borders: &[RwLock<Vec<Wide<T>>>],
-        contact_borders: &[RwLock<Vec<Wide<T>>>],
-    ) {
+    pub(super) fn couple<L: Level>(&mut self, borders: &[RwLock<Vec<Wide<T>>>]) {
         self.couplings.add_product::<L>(T::from_f64(1.0), borders, &mut self.forward_solution);
-        self.contacts.add_product::<L>(contact_borders, &mut self.forward_solution);
     }
 
     /// w ← (I + L̃)⁻¹ w. Returns p · w.

@@ -4,22 +4,23 @@ use std::marker::PhantomData;
 use std::ops::Range;
 use std::sync::{Arc, RwLock};
 
-use energy_dsl::{Block, Kernel, Level, Vector3, dispatch};
+use energy_dsl::{Kernel, Level, Vector3, dispatch};
 
 use self::domain::Domain;
-use crate::contact::Contact;
 use crate::linear::conjugate_gradients::{Steps, conjugate_gradients};
 use crate::linear::domains::{
-    InverseFactor, PerDomain, Precision, RightHandScale, Scaling, Wide, contact_diagonals, create_domains, distribute,
-    invert, ranges,
+    InverseFactor, PerDomain, Precision, RightHandScale, Scaling, Wide, create_domains, extend, invert, ranges,
 };
 use crate::linear::solve::{SingularBlock, SolveOptions, SolveReport, StopReason};
 use crate::matrix::block_matrix::BlockMatrix;
+use crate::matrix::cross_blocks::CrossBlocks;
 use crate::matrix::pattern::{Pattern, Storage};
 use crate::threads::{SpinBarrier, for_each, in_parts, split_mut};
 
 /// ω. Between 1.4 and 1.8, the iterations on sheets of cloth (soft, stiff, fine, coarse) differ by a fifth.
 const RELAXATION: f64 = 1.6;
+/// ω with blocks that the pattern lacks, those of contacts, which are much stiffer than cloth.
+const RELAXATION_IN_CONTACT: f64 = 1.0;
 
 /// Conjugate gradients preconditioned by symmetric successive over-relaxation, at the cost of plain conjugate
 /// gradients: Eisenstat's trick (SIAM J. Sci. Stat. Comput. 2, 1981).
@@ -39,21 +40,21 @@ const RELAXATION: f64 = 1.6;
 /// between them, Ẽ, enter the operator: p + (ω − 2) t + Ẽ t. The domains depend on the matrix alone, and sums run over
 /// them in order, so the solution is bit-identical for any number of threads.
 ///
-/// Contacts have no slots in the pattern. Their diagonal blocks are added to D, and their other blocks to Ẽ; see
-/// [`OverRelaxation::scale_with_contacts`].
+/// Contacts couple rows that the pattern does not; see [`OverRelaxation::scale_with`]. Such blocks are relaxed like all
+/// others.
 ///
 /// [`OverRelaxation::scale`] reuses everything that depends on the pattern alone.
 #[derive(Debug)]
 pub struct OverRelaxation<T> {
     pattern: Arc<Pattern>,
     threads: usize,
+    /// ω of the last matrix.
+    relaxation: f64,
     /// C⁻¹ of each row.
     inverses: Vec<InverseFactor<T>>,
     domains: Vec<Domain<T>>,
     /// The border rows of t for each domain.
     borders: Vec<RwLock<Vec<Wide<T>>>>,
-    /// The rows of t in contact for each domain; empty without contacts.
-    contact_borders: Vec<RwLock<Vec<Wide<T>>>>,
 }
 
 impl<T: Precision> OverRelaxation<T> {
@@ -75,10 +76,9 @@ impl<T: Precision> OverRelaxation<T> {
         assert_eq!(pattern.storage(), Storage::Upper, "only symmetric matrices are solved by conjugate gradients");
         let domains = create_domains(pattern, &ranges(pattern.rows())).into_iter();
         let domains: Vec<_> = domains.map(|(triangle, couplings)| Domain::new(triangle, couplings)).collect();
-        let border = |domain: &Domain<T>| RwLock::new(vec![[T::from_f64(0.0); 4]; domain.couplings.border().len()]);
-        let borders = domains.iter().map(border).collect();
+        let borders = domains.iter().map(|domain| domain.couplings.create_border()).collect();
         let inverses = vec![[[T::from_f64(0.0); 4]; 3]; pattern.rows()];
-        Self { pattern: Arc::clone(pattern), threads, inverses, domains, borders, contact_borders: Vec::new() }
+        Self { pattern: Arc::clone(pattern), threads, relaxation: RELAXATION, inverses, domains, borders }
     }
 
     /// Reads and scales a matrix of the pattern.
@@ -89,63 +89,52 @@ impl<T: Precision> OverRelaxation<T> {
     /// # Panics
     /// If the matrix has another pattern.
     pub fn scale(&mut self, matrix: &BlockMatrix<impl Precision>) -> Result<(), SingularBlock> {
-        self.scale_with_contacts(matrix, &[])
+        self.scale_with(matrix, &CrossBlocks::default())
     }
 
-    /// Reads and scales the sum of a matrix of the pattern and Σ (c cᵀ) ⊗ B over the contacts.
+    /// Reads and scales the sum of a matrix of the pattern and of blocks that the pattern lacks, such as those of
+    /// contacts.
     ///
     /// # Errors
-    /// If a diagonal block of the sum is not positive definite, in which case neither is the sum.
+    /// If a diagonal block is not positive definite, in which case neither is the sum.
     ///
     /// # Panics
-    /// If the matrix has another pattern, or a contact names a row that the matrix does not have.
-    pub fn scale_with_contacts(
+    /// If the matrix has another pattern.
+    pub fn scale_with(
         &mut self,
         matrix: &BlockMatrix<impl Precision>,
-        contacts: &[Contact],
+        cross: &CrossBlocks,
     ) -> Result<(), SingularBlock> {
         assert!(Arc::ptr_eq(&self.pattern, matrix.pattern()), "the matrix has another pattern");
-        let Self { threads, inverses, domains, .. } = self;
+        let Self { pattern, threads, relaxation, inverses, domains, borders } = self;
+        *relaxation = if cross.is_empty() { RELAXATION } else { RELAXATION_IN_CONTACT };
+        let parts = domains.iter_mut().map(|domain| (&mut domain.triangle, &mut domain.couplings));
+        extend(parts, pattern, cross);
+        *borders = domains.iter().map(|domain| domain.couplings.create_border()).collect();
         let rows = || domains.iter().map(|domain| domain.triangle.rows.clone());
         let parts = rows().zip(split_mut(inverses, rows().map(|rows| rows.len()))).collect();
-        let added = &contact_diagonals(contacts, matrix.pattern().rows())[..];
+        let relaxation = *relaxation;
         let inverted =
-            for_each(*threads, parts, |(rows, inverses)| dispatch(Inversion { rows, inverses, matrix, added }));
+            for_each(*threads, parts, |(rows, inverses)| dispatch(Inversion { rows, inverses, matrix, relaxation }));
         inverted.into_iter().collect::<Result<(), usize>>().map_err(|row| SingularBlock { row })?;
         let inverses = &**inverses;
         for_each(*threads, domains.iter_mut().collect(), |Domain { triangle, couplings, .. }| {
-            dispatch(Scaling { triangle, couplings, inverses, matrix });
+            dispatch(Scaling { triangle, couplings, inverses, matrix, cross });
         });
-        self.take_contacts(contacts);
         Ok(())
-    }
-
-    /// Scales contacts with C⁻¹ and hands them to the domains.
-    fn take_contacts(&mut self, contacts: &[Contact]) {
-        let Self { threads, inverses, domains, contact_borders, .. } = self;
-        contact_borders.clear();
-        if contacts.is_empty() {
-            domains.iter_mut().for_each(|domain| domain.contacts = Default::default());
-            return;
-        }
-        let ranges: Vec<_> = domains.iter().map(|domain| domain.triangle.rows.clone()).collect();
-        for (domain, contacts) in domains.iter_mut().zip(distribute(contacts, &ranges, inverses, *threads)) {
-            contact_borders.push(contacts.border());
-            domain.contacts = contacts;
-        }
     }
 
     /// Solves A x = b, starting from x = 0. Residuals are measured as √(rᵀ M⁻¹ r) with M = (D/ω + L) (D/ω)⁻¹ (D/ω +
     /// Lᵀ).
     pub fn solve(&mut self, b: &[Vector3<f64>], x: &mut [Vector3<f64>], options: &SolveOptions) -> SolveReport {
-        let Self { pattern, threads, inverses, domains, borders, contact_borders } = self;
+        let Self { pattern, threads, relaxation, inverses, domains, borders } = self;
         let lengths: Vec<usize> = domains.iter().map(|domain| domain.triangle.rows.len()).collect();
         let sum = || PerDomain::new(lengths.len());
         let common = Common {
             pattern,
             options,
             borders,
-            contact_borders,
+            relaxation: *relaxation,
             right_hand_scale: RightHandScale::new(lengths.len()),
             first_half: sum(),
             second_half: sum(),
@@ -174,9 +163,8 @@ impl<T: Precision> Clone for OverRelaxation<T> {
         let mut copy = Self::with_threads(&self.pattern, self.threads);
         copy.inverses.clone_from(&self.inverses);
         copy.domains.clone_from(&self.domains);
-        if !self.contact_borders.is_empty() {
-            copy.contact_borders = self.domains.iter().map(|domain| domain.contacts.border()).collect();
-        }
+        copy.borders = copy.domains.iter().map(|domain| domain.couplings.create_border()).collect();
+        copy.relaxation = self.relaxation;
         copy
     }
 }
@@ -186,8 +174,7 @@ struct Inversion<'a, T, M> {
     rows: Range<usize>,
     inverses: &'a mut [InverseFactor<T>],
     matrix: &'a BlockMatrix<M>,
-    /// Blocks to add to the diagonal, by row; empty for none.
-    added: &'a [Block<f64>],
+    relaxation: f64,
 }
 
 impl<T: Precision, M: Precision> Kernel for Inversion<'_, T, M> {
@@ -195,7 +182,7 @@ impl<T: Precision, M: Precision> Kernel for Inversion<'_, T, M> {
 
     #[inline(always)]
     fn run<L: Level>(self) -> Self::Output {
-        invert::<T, M, L>(self.matrix, self.added, self.rows, RELAXATION, self.inverses)
+        invert::<T, M, L>(self.matrix, self.rows, self.relaxation, self.inverses)
     }
 }
 
@@ -204,7 +191,7 @@ struct Common<'a, T> {
     pattern: &'a Pattern,
     options: &'a SolveOptions,
     borders: &'a [RwLock<Vec<Wide<T>>>],
-    contact_borders: &'a [RwLock<Vec<Wide<T>>>],
+    relaxation: f64,
     right_hand_scale: RightHandScale,
     /// p · t, p · w and r · r. All threads read each number before any of them reaches its next update.
     first_half: PerDomain,
@@ -269,14 +256,13 @@ impl<T: Precision, L: Level> Steps for AtLevel<'_, T, L> {
     #[inline(always)]
     fn conjugate(&mut self, ratio: f64) -> f64 {
         let Gradients { parts, common, barrier } = &mut self.gradients;
-        let Common { pattern, borders, contact_borders, first_half, second_half, .. } = common;
+        let Common { pattern, borders, relaxation, first_half, second_half, .. } = common;
         for Part { number, domain, .. } in &mut *parts {
-            let (border, contact_border) = (&borders[*number], contact_borders.get(*number));
-            first_half.put(*number, domain.backward::<L>(pattern, ratio, border, contact_border));
+            first_half.put(*number, domain.backward::<L>(pattern, *relaxation, ratio, &borders[*number]));
         }
         barrier.wait();
         for Part { number, domain, .. } in parts {
-            domain.couple::<L>(borders, contact_borders);
+            domain.couple::<L>(borders);
             second_half.put(*number, domain.forward::<L>(pattern));
         }
         barrier.wait();

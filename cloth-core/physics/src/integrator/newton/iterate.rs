@@ -6,7 +6,7 @@ use energy_solve::{
 };
 
 use super::super::projection::{Progress, Projection};
-use super::super::trial::Trial;
+use super::super::trial::Trials;
 use super::super::{StepError, StepReport};
 use super::forcing::Forcing;
 use super::incremental_potential::{Energy, EnergyAndGradient, IncrementalPotential};
@@ -19,7 +19,7 @@ pub(super) struct Iterate<'a> {
     pub(super) options: NewtonOptions,
     pub(super) potential: IncrementalPotential<'a>,
     memory: &'a mut Memory,
-    trial: &'a mut Trial,
+    trials: &'a mut Trials,
     pub(super) projection: Projection,
     pub(super) x: Vec<Vector3<f64>>,
     pub(super) energy: Energy,
@@ -86,7 +86,7 @@ impl<'a> Iterate<'a> {
         options: NewtonOptions,
         mut potential: IncrementalPotential<'a>,
         memory: &'a mut Memory,
-        trial: &'a mut Trial,
+        trials: &'a mut Trials,
         mut x: Vec<Vector3<f64>>,
     ) -> Result<Self, EvaluationError> {
         let in_contact = potential.contact.is_some();
@@ -111,7 +111,7 @@ impl<'a> Iterate<'a> {
             options,
             potential,
             memory,
-            trial,
+            trials,
             projection,
             x,
             energy,
@@ -228,14 +228,14 @@ impl<'a> Iterate<'a> {
         let Memory { matrix, solver } = &mut *self.memory;
         let started = Instant::now();
         let contacts = matrix.add_contacts(&contacts, scale, threads);
-        let prepared = solver.prepare(matrix, &contacts.others, self.trial);
+        let prepared = solver.prepare(matrix, &contacts.cross, self.trials);
         self.potential.report.phases.factorisation += started.elapsed();
 
         let started = Instant::now();
         let mut direction = vec![[0.0; 3]; downhill.len()];
         let mut solved = SolveReport::indefinite();
         if prepared.is_ok() {
-            let (report, solved_by) = solver.solve(downhill, &mut direction, &options, self.trial);
+            let (report, solved_by) = solver.solve(downhill, &mut direction, &options, self.trials);
             solved = report;
             self.potential.report.solved_by += solved_by;
         }
@@ -268,7 +268,7 @@ impl<'a> Iterate<'a> {
         let (scale, threads) = (self.potential.dt * self.potential.dt, self.potential.body.system.threads());
         let contacts = matrix.add_contacts(&contacts, scale, threads);
         let mut solver = OverRelaxation::<f64>::with_threads(matrix.pattern(), threads);
-        solver.scale_with_contacts(&matrix, &contacts.others)?;
+        solver.scale_with(&matrix, &contacts.cross)?;
         Ok(solver.solve(downhill, direction, options))
     }
 

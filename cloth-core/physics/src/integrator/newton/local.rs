@@ -139,7 +139,7 @@ impl IncrementalPotential<'_> {
         let contacts = matrix.add_contacts(&contacts, scale, threads);
         let mut vectors = vec![[0.0; 3]; downhill.len()];
         let mut solved = SolveReport::indefinite();
-        if solver.scale_with_contacts(matrix, &contacts.others).is_ok() {
+        if solver.scale_with(matrix, &contacts.cross).is_ok() {
             let options = SolveOptions::new(TOLERANCE);
             solved = solver.solve(&downhill, &mut vectors, &options);
         }

@@ -13,7 +13,7 @@ use energy_solve::{BlockMatrix, ContactStep, EvaluationError, PlacedTerm, System
 use serde::{Deserialize, Serialize};
 
 use super::linear_solver::{LinearSolver, LinearSolverChoice};
-use super::trial::Trial;
+use super::trial::Trials;
 use super::warm_start::WarmStart;
 use super::{Integrator, IntegratorMemory, StepError, StepReport};
 use crate::body::Body;
@@ -47,7 +47,7 @@ use iterate::Iterate;
 #[derive(Clone, Debug, Default)]
 pub struct Newton {
     options: NewtonOptions,
-    trial: Trial,
+    trials: Trials,
     warm_start: WarmStart,
     memory: Option<Memory>,
     /// The work of steps that failed.
@@ -166,7 +166,7 @@ impl Newton {
         let x = self.warm_start.begin(body, dt);
         let mut potential = IncrementalPotential::new(body, contact, dt);
         potential.report.phases.preparation += started.elapsed();
-        let mut iterate = Iterate::new(self.options, potential, &mut memory, &mut self.trial, x)?;
+        let mut iterate = Iterate::new(self.options, potential, &mut memory, &mut self.trials, x)?;
         let converged = iterate.converge();
         let (x, report) = iterate.into_result();
         if let Err(reason) = converged {
@@ -202,11 +202,11 @@ impl Integrator for Newton {
 
     fn memory(&self) -> IntegratorMemory {
         let warm_start = self.warm_start.clone();
-        IntegratorMemory { trial: self.trial, warm_start, ..IntegratorMemory::default() }
+        IntegratorMemory { trials: self.trials, warm_start, ..IntegratorMemory::default() }
     }
 
     fn restore(&mut self, memory: IntegratorMemory) {
-        (self.trial, self.warm_start) = (memory.trial, memory.warm_start);
+        (self.trials, self.warm_start) = (memory.trials, memory.warm_start);
     }
 
     fn stable_step(&self, _: &mut Body) -> Result<Option<f64>, EvaluationError> {
