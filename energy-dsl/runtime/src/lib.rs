@@ -50,10 +50,7 @@ pub use numbers::{
     Unbounded, UnknownLevel, available, dispatch, dispatch_at, level,
 };
 #[doc(hidden)]
-pub use numbers::{
-    Care, GeneralPath, MASKS, Precautions, Ray, Roles, Trace, TraceStep, WithCare, elementary_functions, settle,
-    with_care,
-};
+pub use numbers::{MASKS, Ray, Settle, Settled, Trace, TraceStep, elementary_functions};
 pub use results::{
     ConstraintHessian, ConstraintJacobian, ForceJacobians, ForceValue, Gradient, Hessian, HessianVector,
     MixedConstraintHessian, MixedConstraintJacobian, MixedForceValue, MixedGradient, MixedHessian, MixedJacobians,

@@ -6,7 +6,7 @@
 //!
 //! For a sum of like terms, these are the routines of one term, and `f_at` is the loop over all.
 
-use proc_macro2::{Ident, TokenStream};
+use proc_macro2::{Ident, Literal, TokenStream};
 use quote::{format_ident, quote};
 
 use super::Emitter;
@@ -15,6 +15,8 @@ use super::statements::arranged;
 use crate::check::{Input as DeclaredInput, Program};
 use crate::graph::Input;
 use crate::plan::{Code, GeneralPlan, RoutinePlan, Shape, groups};
+use crate::tape::{TooLarge, general_path};
+use energy_runtime::tape::EncodedPath;
 use energy_runtime::{Kind, RoutineKind};
 
 /// A routine as a method of its trait.
@@ -258,8 +260,11 @@ fn method(emitter: &Emitter<'_>, routine: &RoutinePlan, owner: &Ident) -> Emitte
             // replaced afterwards. A scalar branches on the guards first. It looks at its results after they are
             // computed: before the branch, they would occupy registers. Values are passed by copy: a reference would
             // force them into memory on both paths.
-            let WithCare { inputs, outputs, returns, code } = with_care(emitter, &method, owner, routine, general);
-            let (reads, summed) = (inputs.len(), general.summed);
+            let (inputs, _) = general.inputs();
+            let inputs: Vec<TokenStream> =
+                inputs.iter().map(|&input| read_input(emitter.program, routine.kind, input)).collect();
+            let (reads, returns) = (inputs.len(), routine.sizes().iter().sum::<usize>());
+            let (path, outputs) = (encoded(emitter, routine, general), outputs(&method, general));
             let select = quote! {
                 if T::WIDE {
                     let ordinary = self.#is_ordinary::<L>(#(#names),*);
@@ -308,9 +313,9 @@ fn method(emitter: &Emitter<'_>, routine: &RoutinePlan, owner: &Ident) -> Emitte
                     ordinary: T::Mask,
                     here: ::core::option::Option<#parts>
                 ) -> #parts {
-                    #code
-                    let (numbers, flags) =
-                        ::energy_dsl::with_care::<WithCare, T, #reads, #returns>(inputs, !ordinary, #summed);
+                    static PATH: ::energy_dsl::tape::EncodedPath = #path;
+                    let mut numbers = [T::from_f64(0.0); #returns];
+                    let flags = PATH.run(inputs, !ordinary, &mut numbers);
                     let mut general = ::energy_dsl::#result { #outputs flags };
                     if let ::core::option::Option::Some((#(#fields),*)) = here {
                         let here = ::energy_dsl::#result { #(#fields),* };
@@ -349,91 +354,37 @@ fn method(emitter: &Emitter<'_>, routine: &RoutinePlan, owner: &Ident) -> Emitte
     Emitted { plain, levelled, general }
 }
 
-/// The general path of a routine: inputs, outputs and code.
-struct WithCare {
-    /// Inputs, as read by the method of the element.
-    inputs: Vec<TokenStream>,
-    /// Fields of the result, taken from `numbers`.
-    outputs: TokenStream,
-    /// Number of outputs.
-    returns: usize,
-    code: TokenStream,
+/// Emits a general path as data. It is thousands of operations and rarely runs, so that code would only cost compilers'
+/// time.
+fn encoded(emitter: &Emitter<'_>, routine: &RoutinePlan, general: &GeneralPlan) -> TokenStream {
+    match general_path(routine, general) {
+        Ok(path) => {
+            let bytes = EncodedPath::encode(&path);
+            emitter.program.budget.spend(bytes.len() as u64, 4 * bytes.len() as u64);
+            let bytes = Literal::byte_string(&bytes);
+            quote!(::energy_dsl::tape::EncodedPath::new(#bytes))
+        }
+        Err(TooLarge) => {
+            let (name, routine) = (&emitter.program.name, routine.kind.name());
+            let message = format!("`{routine}` of `{name}` has more than 65 535 numbers at a time");
+            quote!(::core::compile_error!(#message))
+        }
+    }
 }
 
-fn with_care(
-    emitter: &Emitter<'_>,
-    method: &Method,
-    owner: &Ident,
-    routine: &RoutinePlan,
-    general: &GeneralPlan,
-) -> WithCare {
-    let (inputs, moves) = general.inputs();
-    let mut read = |input: Input| {
-        let number = inputs.iter().position(|&other| other == input).expect("compiler bug: an input of the path");
-        quote!(inputs[#number])
-    };
-    let path = emitter.rendered(&general.path, &mut read);
-    let results = arranged(Shape::Numbers, &path.numbers(&general.path.groups.concat()));
-    let [degenerate, kink] = general.path.flags.map(|mask| path.mask(mask));
-    let [outside, definite] = general.path.settled.map(|mask| path.mask(mask));
-    let statements = path.statements;
-    let is_outside = match &general.outside {
-        None => quote!(::energy_dsl::Mask::none()),
-        Some(outside) => returned_mask(emitter, outside, &mut read),
-    };
+/// Emits the fields of a routine's result, taken from `numbers`.
+fn outputs(method: &Method, general: &GeneralPlan) -> TokenStream {
     let mut numbers = (0_usize..).map(|number| quote!(numbers[#number]));
-    let outputs = method.fields.iter().zip(&general.path.groups).map(|(Field { name, shape, .. }, group)| {
+    let fields = method.fields.iter().zip(&general.path.groups).map(|(Field { name, shape, .. }, group)| {
         let value = arranged(*shape, &numbers.by_ref().take(group.len()).collect::<Vec<_>>());
         quote!(#name: #value,)
     });
-    let outputs = outputs.collect();
-    let (sizes, values_first, is_energy) = (routine.sizes(), routine.kind.has_values(), routine.kind.is_energy());
-    let inputs: Vec<TokenStream> =
-        inputs.iter().map(|&input| read_input(emitter.program, routine.kind, input)).collect();
-    let (reads, returns) = (inputs.len(), sizes.iter().sum());
-    let what = format!("`{}` of [`{owner}`].", method.name);
-    let code = quote! {
-        #[doc = #what]
-        struct WithCare;
-
-        impl ::energy_dsl::WithCare<#reads, #returns> for WithCare {
-            const ROLES: ::energy_dsl::Roles<'static> =
-                ::energy_dsl::Roles {
-                    moves: &[#(#moves),*],
-                    groups: &[#(#sizes),*],
-                    values_first: #values_first,
-                    is_energy: #is_energy,
-                };
-
-            fn compiled() -> &'static ::energy_dsl::Precautions<#reads, #returns> {
-                static COMPILED: ::energy_dsl::Precautions<#reads, #returns> =
-                    ::energy_dsl::Precautions::of::<WithCare>();
-                &COMPILED
-            }
-
-            fn run_at<T: ::energy_dsl::Real, L: ::energy_dsl::Level>(
-                inputs: &[T; #reads],
-            ) -> ([T; #returns], ::energy_dsl::Care<T>) {
-                #statements
-                let flags = ::energy_dsl::Flags { degenerate: #degenerate, kink: #kink };
-                (#results, ::energy_dsl::Care { flags, outside: #outside, definite: #definite })
-            }
-
-            fn is_outside_at<T: ::energy_dsl::Real, L: ::energy_dsl::Level>(inputs: &[T; #reads]) -> T::Mask {
-                #is_outside
-            }
-        }
-    };
-    WithCare { inputs, outputs, returns, code }
+    fields.collect()
 }
 
 /// Emits statements and the mask of a guard.
 fn mask(emitter: &Emitter<'_>, kind: RoutineKind, code: &Code) -> TokenStream {
-    returned_mask(emitter, code, &mut |input| read_input(emitter.program, kind, input))
-}
-
-fn returned_mask(emitter: &Emitter<'_>, code: &Code, read: &mut dyn FnMut(Input) -> TokenStream) -> TokenStream {
-    let rendered = emitter.rendered(code, read);
+    let rendered = emitter.rendered(code, &mut |input| read_input(emitter.program, kind, input));
     let (mask, statements) = (rendered.mask(code.guard), rendered.statements);
     quote!(#statements #mask)
 }

@@ -67,7 +67,12 @@ fn pieces(code: TokenStream) -> Vec<Piece> {
                 Some(Piece::Symbol(quote)) if quote == "'" => *quote = format!("'{name}"),
                 _ => pieces.push(Piece::Word(name.to_string())),
             },
-            TokenTree::Literal(literal) => pieces.push(Piece::Word(without_type(&literal.to_string()))),
+            TokenTree::Literal(literal) => {
+                let text = literal.to_string();
+                // The bytes of a general path say nothing to a reader.
+                let is_data = text.starts_with("b\"");
+                pieces.push(Piece::Word(if is_data { "b\"…\"".into() } else { without_type(&text) }));
+            }
         }
     }
     pieces

@@ -87,7 +87,7 @@ impl Listing {
         &self.name
     }
 
-    /// Returns all generated code.
+    /// Returns all generated code. Of general paths, which are data, it says `b"…"`.
     #[must_use]
     pub fn code(&self) -> String {
         layout(&self.code)

@@ -6,7 +6,7 @@ mod steps;
 use crate::graph::Input;
 use crate::plan::{Code, GeneralPlan, Plan, RoutinePlan};
 use energy_runtime::RoutineKind;
-use energy_runtime::tape::{General, Routine, Routines};
+use energy_runtime::tape::{General, GeneralPath, Routine, Routines};
 use recorder::Recorded;
 
 pub(crate) use recorder::{TooLarge, record};
@@ -53,23 +53,27 @@ fn routine_tape(routine: &RoutinePlan, mut inputs: Vec<Input>) -> Result<Routine
     }
     let Recorded { tape, groups, flags, guard, .. } = record(code, &inputs)?;
     let general = match (general, guard) {
-        (Some(general), Some(guard)) => Some(general_tape(general, guard, &inputs)?),
+        (Some(general), Some(ordinary)) => {
+            let place = |input: &Input| inputs.iter().position(|other| other == input).expect("it was added");
+            let own = general.inputs().0;
+            let places = own.iter().map(place).map(u16::try_from).collect::<Result<_, _>>().map_err(|_| TooLarge)?;
+            Some(General { ordinary, inputs: places, path: general_path(routine, general)? })
+        }
         _ => None,
     };
     Ok(Routine { kind: *kind, inputs, tape, groups, flags, general })
 }
 
-/// Writes a general path to a tape. `guard` is the mask slot of the ordinary tape, which has these `inputs`.
-fn general_tape(general: &GeneralPlan, guard: u16, inputs: &[Input]) -> Result<General, TooLarge> {
+/// Returns the general path of a routine as data.
+pub(crate) fn general_path(routine: &RoutinePlan, general: &GeneralPlan) -> Result<GeneralPath, TooLarge> {
     let (own, moves) = general.inputs();
-    let place = |input: &Input| inputs.iter().position(|other| other == input).expect("it was added");
-    let places = own.iter().map(place).map(u16::try_from).collect::<Result<_, _>>().map_err(|_| TooLarge)?;
     let Recorded { tape, groups, flags, settled, .. } = record(&general.path, &own)?;
     let outside = general.outside.as_ref().map(|code| record(code, &own)).transpose()?;
-    Ok(General {
-        ordinary: guard,
-        inputs: places,
+    Ok(GeneralPath {
         moves,
+        groups: routine.sizes(),
+        values_first: routine.kind.has_values(),
+        is_energy: routine.kind.is_energy(),
         tape,
         results: groups.concat(),
         flags,

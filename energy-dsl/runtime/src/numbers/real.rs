@@ -3,8 +3,9 @@ use std::ops::{Add, BitAnd, BitOr, Div, Mul, Neg, Not, Sub};
 
 use super::cpu::{Scalar, dispatch_scalar};
 use super::elementary::{Atan2, Binary, Cos, Exp, Ln, ModerateAtan2, Pow, Sin, Unary, sin_cos};
+use super::flags::Flags;
 use super::level::{Baseline, Kernel, Level};
-use super::unbounded::{GeneralPath, Unbounded, WithCare};
+use super::unbounded::{Settle, Unbounded};
 
 /// The outcome of a comparison: a `bool`, or one per lane.
 pub trait Mask: Copy + Debug + BitAnd<Output = Self> + BitOr<Output = Self> + Not<Output = Self> {
@@ -181,13 +182,10 @@ pub trait Number:
     fn is_representable(&self) -> bool {
         (self.clone() - self.clone()).equal(Self::from_f64(0.0)).all()
     }
-    /// Returns the general path of a routine over this type.
+    /// Runs the general path of a routine over this type.
     #[doc(hidden)]
-    fn general_path<W: WithCare<INPUTS, OUTPUTS>, const INPUTS: usize, const OUTPUTS: usize>() -> GeneralPath<Self>
-    where
-        Self: Real,
-    {
-        GeneralPath::of::<W, INPUTS, OUTPUTS>()
+    fn general_path(path: &impl Settle, inputs: &[Self]) -> (Vec<Self>, Flags<Self>) {
+        path.settled(inputs)
     }
     /// Runs a kernel over this type at the level that suits it: the best level of the machine for `f64` and `f32`.
     fn dispatch<K: Kernel>(kernel: K) -> K::Output {

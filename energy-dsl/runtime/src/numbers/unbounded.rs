@@ -2,12 +2,10 @@
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
-use super::cpu::{Fused, Scalar};
+use super::cpu::Scalar;
 use super::flags::Flags;
 use super::level::Level;
-use super::limits::{Care, Roles, fill_outside, settle};
-use super::ray::Ray;
-use super::real::{Mask, Number, Real};
+use super::real::Number;
 
 /// The number significand · 2^exponent. It rounds as the floating-point type does, but intermediate results neither
 /// overflow nor underflow. Extraordinary configurations are computed with it: edges of length 1e-160, whose squares
@@ -328,161 +326,32 @@ impl<S: Scalar> Number for Unbounded<S> {
         let large = S::power_of_two(S::LAST - 8);
         Self::of(if S::default() < self.significand { large } else { -large })
     }
-    fn general_path<W: WithCare<INPUTS, OUTPUTS>, const INPUTS: usize, const OUTPUTS: usize>() -> GeneralPath<Self> {
-        S::unbounded_path::<W, INPUTS, OUTPUTS>()
+    fn general_path(path: &impl Settle, inputs: &[Self]) -> (Vec<Self>, Flags<Self>) {
+        S::unbounded_path(path, inputs)
     }
 }
 
-/// The general path of a routine: all precautions, flattened inputs and outputs.
-///
-/// It always uses fused operations. It is so rare that their cost does not matter, and all levels give the same bits.
+/// Results with an extended exponent, and their flags.
+pub type Settled<S> = (Vec<Unbounded<S>>, Flags<Unbounded<S>>);
+
+/// The general path of a routine. It returns all results, and whether they are limits.
 #[doc(hidden)]
-pub trait WithCare<const INPUTS: usize, const OUTPUTS: usize> {
-    /// Kinds of inputs and outputs.
-    const ROLES: Roles<'static>;
+pub trait Settle {
+    /// Runs the path over any numbers.
+    fn settled<T: Number>(&self, inputs: &[T]) -> (Vec<T>, Flags<T>);
 
-    /// Runs the path at a SIMD level.
-    fn run_at<T: Real, L: Level>(inputs: &[T; INPUTS]) -> ([T; OUTPUTS], Care<T>);
+    /// Runs the path in double precision. As it is not generic, it is compiled once, not in each crate that uses
+    /// elements.
+    fn in_double(&self, inputs: &[Unbounded<f64>]) -> Settled<f64>;
 
-    /// Returns whether the input is outside of the formula's domain, by more than rounding errors.
-    fn is_outside_at<T: Real, L: Level>(inputs: &[T; INPUTS]) -> T::Mask;
-
-    /// Returns the path in double precision, as compiled by the declaring crate.
-    fn compiled() -> &'static Precautions<INPUTS, OUTPUTS>;
-
-    /// Runs the path with fused operations.
-    fn run<T: Real>(inputs: &[T; INPUTS]) -> ([T; OUTPUTS], Care<T>) {
-        Self::run_at::<T, Fused>(inputs)
-    }
-}
-
-/// The general path of a routine in double precision and along rays. As a `static` it is compiled once, in the crate
-/// that declares the element. Crates that use single precision compile that path themselves.
-#[doc(hidden)]
-#[derive(Debug)]
-pub struct Precautions<const INPUTS: usize, const OUTPUTS: usize> {
-    pub(crate) double: GeneralPath<Unbounded<f64>>,
-    ray: OnSlices<Ray>,
-}
-
-impl<const INPUTS: usize, const OUTPUTS: usize> Precautions<INPUTS, OUTPUTS> {
-    /// Creates the table of a routine.
-    #[must_use]
-    pub const fn of<W: WithCare<INPUTS, OUTPUTS>>() -> Self {
-        Self { double: GeneralPath::of::<W, INPUTS, OUTPUTS>(), ray: on_slices::<W, Ray, INPUTS, OUTPUTS> }
-    }
-}
-
-/// Writes the results of a routine at some inputs. With slices, the code that calls it is the same for all routines.
-pub type OnSlices<T> = fn(&[T], &mut [T]) -> Care<T>;
-
-/// The general path of a routine.
-#[derive(Clone, Copy, Debug)]
-pub struct GeneralPath<T: Number> {
-    pub(crate) run: OnSlices<T>,
-    /// Whether an input is outside of the formula's domain. The path says so, too; this is quicker.
-    pub(crate) is_outside: fn(&[T]) -> bool,
-}
-
-impl<T: Real> GeneralPath<T> {
-    pub(crate) const fn of<W: WithCare<INPUTS, OUTPUTS>, const INPUTS: usize, const OUTPUTS: usize>() -> Self {
-        Self {
-            run: on_slices::<W, T, INPUTS, OUTPUTS>,
-            is_outside: |inputs| W::is_outside_at::<T, Fused>(array(inputs)).any(),
-        }
-    }
-}
-
-/// Runs the general path of a routine.
-fn on_slices<W: WithCare<INPUTS, OUTPUTS>, T: Real, const INPUTS: usize, const OUTPUTS: usize>(
-    inputs: &[T],
-    results: &mut [T],
-) -> Care<T> {
-    let (found, care) = W::run(array(inputs));
-    results.copy_from_slice(&found);
-    care
-}
-
-fn array<T, const INPUTS: usize>(inputs: &[T]) -> &[T; INPUTS] {
-    inputs.try_into().expect("as many numbers as inputs")
-}
-
-/// Runs the general path in the lanes where `extraordinary` holds; the other lanes are 0. Scalars and lanes run the
-/// same code and give the same bits. Outputs from index `summed` on are [`Number::saturated`], because they are added
-/// to each other later.
-#[doc(hidden)]
-#[cold]
-#[inline(never)]
-#[must_use]
-pub fn with_care<W: WithCare<INPUTS, OUTPUTS>, T: Real, const INPUTS: usize, const OUTPUTS: usize>(
-    inputs: &[T; INPUTS],
-    extraordinary: T::Mask,
-    summed: usize,
-) -> ([T; OUTPUTS], Flags<T>) {
-    let mut outputs = [T::from_f64(0.0); OUTPUTS];
-    let (ray, own) = (W::compiled().ray, T::Unbounded::general_path::<W, INPUTS, OUTPUTS>());
-    let path = Path { roles: W::ROLES, own, ray };
-    let flags = in_lanes(inputs, extraordinary, summed, &mut outputs, &path);
-    (outputs, flags)
-}
-
-/// The general path of a routine.
-struct Path<T: Number> {
-    roles: Roles<'static>,
-    own: GeneralPath<T>,
-    ray: OnSlices<Ray>,
-}
-
-/// Runs a path in some lanes. It is compiled once for a type of lanes, not once for a routine: it is more code than the
-/// paths themselves.
-#[inline(never)]
-fn in_lanes<T: Real>(
-    inputs: &[T],
-    lanes: T::Mask,
-    summed: usize,
-    outputs: &mut [T],
-    path: &Path<T::Unbounded>,
-) -> Flags<T> {
-    let (mut degenerate, mut kink) = (0, 0);
-    let mut results = vec![T::Unbounded::from_f64(0.0); outputs.len()];
-    for lane in 0..u32::BITS as usize {
-        if lanes.bits() >> lane & 1 == 0 {
-            continue;
-        }
-        let own: Vec<T::Unbounded> = inputs.iter().map(|input| input.unbounded(lane)).collect();
-        let flags = path.of_one(&own, &mut results);
-        for (number, (output, &result)) in outputs.iter_mut().zip(&results).enumerate() {
-            output.set_lane(lane, if number < summed { result } else { result.saturated() });
-        }
-        degenerate |= u32::from(flags.degenerate.any()) << lane;
-        kink |= u32::from(flags.kink.any()) << lane;
-    }
-    let mask = <T::Mask as Mask>::from_bits;
-    Flags { degenerate: mask(degenerate), kink: mask(kink) }
-}
-
-impl<T: Real> Path<T> {
-    /// Writes the results at one input.
-    fn of_one(&self, inputs: &[T], results: &mut [T]) -> Flags<T> {
-        if (self.own.is_outside)(inputs) {
-            fill_outside(self.roles, results);
-            return Flags::degenerate();
-        }
-        let care = (self.own.run)(inputs, results);
-        let outputs = results.len();
-        let along = |rays: &[Ray]| {
-            let mut results = vec![Ray::from_f64(0.0); outputs];
-            let care = (self.ray)(rays, &mut results);
-            (results, care.flags.degenerate)
-        };
-        settle(inputs, self.roles, results, care, &along)
-    }
+    /// The same in single precision.
+    fn in_single(&self, inputs: &[Unbounded<f32>]) -> Settled<f32>;
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::numbers::Lane;
+    use crate::numbers::Fused;
     use crate::numbers::level::Baseline;
 
     fn of<S: Scalar>(value: S) -> Unbounded<S> {
@@ -574,41 +443,5 @@ mod tests {
         assert!(f64::is_nan((of(0.0) / of(0.0)).to_scalar()));
         assert_eq!((of(1.0) / of(0.0)).to_scalar(), f64::INFINITY);
         assert_eq!((of(f64::INFINITY) + of(1e-300)).to_scalar(), f64::INFINITY);
-    }
-
-    /// x², with a documented value and a flag at 1.
-    struct Square;
-
-    static SQUARE: Precautions<1, 1> = Precautions::of::<Square>();
-
-    impl WithCare<1, 1> for Square {
-        const ROLES: Roles<'static> = Roles { moves: &[true], groups: &[1], values_first: true, is_energy: true };
-
-        fn run_at<T: Real, L: Level>(&[x]: &[T; 1]) -> ([T; 1], Care<T>) {
-            let definite = x.equal(T::from_f64(1.0));
-            ([x * x], Care { flags: Flags::clear(), outside: T::Mask::none(), definite })
-        }
-
-        fn is_outside_at<T: Real, L: Level>(&[x]: &[T; 1]) -> T::Mask {
-            x.less(T::from_f64(0.0))
-        }
-
-        fn compiled() -> &'static Precautions<1, 1> {
-            &SQUARE
-        }
-    }
-
-    #[test]
-    fn general_paths_run_in_the_lanes_that_need_them() {
-        type Wide = <Baseline as Level>::F64;
-        let run = |x: [f64; 2], lanes: u32| {
-            let lanes = <Wide as Number>::Mask::from_bits(lanes);
-            let ([squares], flags) = with_care::<Square, Wide, 1, 1>(&[Wide::load(&x)], lanes, 1);
-            ([0, 1].map(|lane| squares.extract(lane)), flags.degenerate.bits(), flags.kink.bits())
-        };
-        assert_eq!(run([2.0, 3.0], 0b11), ([4.0, 9.0], 0, 0));
-        assert_eq!(run([2.0, 3.0], 0b10), ([0.0, 9.0], 0, 0));
-        assert_eq!(run([2.0, 1.0], 0b11), ([4.0, 1.0], 0b10, 0));
-        assert_eq!(run([-2.0, 3.0], 0b11), ([f64::INFINITY, 9.0], 0b01, 0));
     }
 }

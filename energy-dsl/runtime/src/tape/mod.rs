@@ -8,7 +8,9 @@
 //! Results have the bits of generated code at the same SIMD level. Elements that the ordinary path does not suit run
 //! on the general path, one at a time, over numbers with an extended exponent.
 
+mod encoded;
 mod evaluate;
+mod general;
 mod instruction;
 mod lanes;
 mod operation;
@@ -20,7 +22,9 @@ mod slots;
 #[cfg(test)]
 mod tests;
 
+pub use encoded::EncodedPath;
 pub use evaluate::{BlockResults, Expander, Output};
+pub use general::GeneralPath;
 pub use instruction::{Constant, Instruction, Tape};
 pub use lanes::Slot;
 pub use operation::{Operation, ROWS};

@@ -28,3 +28,10 @@ macro_rules! define {
 }
 
 with_operations!(define);
+
+impl Operation {
+    /// Returns all operations, each at the index that is its code.
+    pub(super) fn by_code() -> Vec<Self> {
+        ROWS.iter().map(|row| row.0).chain([Self::IsModerate, Self::Select]).collect()
+    }
+}

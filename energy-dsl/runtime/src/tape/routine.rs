@@ -1,9 +1,10 @@
 //! The routines of an element as tapes.
 
+use super::general::GeneralPath;
 use super::instruction::Tape;
 use super::scalar::Values;
 use crate::RoutineKind;
-use crate::numbers::{Care, Flags, Fused, Level, Mask, Number, Ray, Roles, fill_outside, settle};
+use crate::numbers::{Flags, Level, Mask, Number};
 
 /// The source of an input number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -78,27 +79,15 @@ pub struct Routine {
     pub general: Option<General>,
 }
 
-/// The general path of a routine, with all precautions. It runs over numbers with an extended exponent.
+/// The general path of a routine, and where the routine takes it.
 #[derive(Clone, Debug)]
 pub struct General {
     /// Mask slot of the ordinary tape: where the ordinary path suffices.
     pub ordinary: u16,
-    /// Indices among the inputs of the routine, in the order of the first slots.
+    /// Indices among the inputs of the routine, in the order of the path's inputs.
     pub inputs: Vec<u16>,
-    /// Whether derivatives are taken with respect to an input.
-    pub moves: Vec<bool>,
     /// The path.
-    pub tape: Tape,
-    /// Slots of the results, in the order of the routine's results.
-    pub results: Vec<u16>,
-    /// Mask slots of inputs at which a result may be a convention: degenerate, kink.
-    pub flags: [Option<u16>; 2],
-    /// Mask slots of inputs outside of the domain, and of conventions without a limit.
-    pub settled: [Option<u16>; 2],
-    /// A tape over the same inputs with a mask slot: the inputs outside of the domain; `None` if all inputs are inside.
-    pub outside: Option<(Tape, u16)>,
-    /// Index from which results are added to each other later.
-    pub summed: usize,
+    pub path: GeneralPath,
 }
 
 impl Routine {
@@ -115,7 +104,7 @@ impl Routine {
         let values = self.tape.run::<T, L>(inputs.iter().cloned());
         match &self.general {
             Some(general) if !values.mask(Some(general.ordinary)).all() => {
-                general.run(self.kind, &self.sizes(), |input| inputs[usize::from(input)].clone())
+                general.run(|input| inputs[usize::from(input)].clone())
             }
             _ => {
                 let results = self.groups.iter().flatten().map(|&slot| values.number(slot)).collect();
@@ -126,57 +115,17 @@ impl Routine {
 }
 
 impl General {
-    /// Runs the path. `input` returns a number by its index among the inputs of the routine, which is of some kind and
-    /// has groups of these `sizes`.
+    /// Runs the path for one element. `input` returns a number by its index among the inputs of the routine.
     #[cold]
-    pub(super) fn run<T: Number>(
-        &self,
-        kind: RoutineKind,
-        sizes: &[usize],
-        input: impl Fn(u16) -> T,
-    ) -> (Vec<T>, Flags<T>) {
-        let inputs: Vec<T::Unbounded> = self.inputs.iter().map(|&number| input(number).unbounded(0)).collect();
-        let (values_first, is_energy) = (kind.has_values(), kind.is_energy());
-        let roles = Roles { moves: &self.moves, groups: sizes, values_first, is_energy };
-        let (results, flags) = self.settled(&inputs, roles);
-        let bounded = |(number, value): (usize, T::Unbounded)| {
-            let mut result = T::from_f64(0.0);
-            result.set_lane(0, if number < self.summed { value } else { value.saturated() });
-            result
-        };
-        let mask = |mask: <T::Unbounded as Number>::Mask| T::Mask::from_bits(u32::from(mask.any()));
-        let flags = Flags { degenerate: mask(flags.degenerate), kink: mask(flags.kink) };
-        (results.into_iter().enumerate().map(bounded).collect(), flags)
-    }
-
-    /// Returns all results, and whether they are limits.
-    fn settled<T: Number>(&self, inputs: &[T], roles: Roles<'_>) -> (Vec<T>, Flags<T>) {
-        let is_outside =
-            |(tape, slot): &(Tape, u16)| tape.run::<T, Fused>(inputs.iter().cloned()).mask(Some(*slot)).any();
-        if self.outside.as_ref().is_some_and(is_outside) {
-            let mut results = vec![T::from_f64(0.0); self.results.len()];
-            fill_outside(roles, &mut results);
-            return (results, Flags::degenerate());
-        }
-        let (mut results, care) = self.at(inputs);
-        let along = |rays: &[Ray]| {
-            let (results, care) = self.at(rays);
-            (results, care.flags.degenerate)
-        };
-        let flags = settle(inputs, roles, &mut results, care, &along);
+    pub(super) fn run<T: Number>(&self, input: impl Fn(u16) -> T) -> (Vec<T>, Flags<T>) {
+        let inputs: Vec<T> = self.inputs.iter().map(|&number| input(number)).collect();
+        let mut results = vec![T::from_f64(0.0); self.path.results.len()];
+        let flags = self.path.run(&inputs, T::Mask::from_bits(1), &mut results);
         (results, flags)
-    }
-
-    /// Always runs with fused operations, as the general paths of generated code do.
-    fn at<T: Number>(&self, inputs: &[T]) -> (Vec<T>, Care<T>) {
-        let values = self.tape.run::<T, Fused>(inputs.iter().cloned());
-        let [outside, definite] = self.settled.map(|slot| values.mask(slot));
-        let care = Care { flags: flags(&values, self.flags), outside, definite };
-        (self.results.iter().map(|&slot| values.number(slot)).collect(), care)
     }
 }
 
-fn flags<T: Number>(values: &Values<T>, slots: [Option<u16>; 2]) -> Flags<T> {
+pub(super) fn flags<T: Number>(values: &Values<T>, slots: [Option<u16>; 2]) -> Flags<T> {
     Flags { degenerate: values.mask(slots[0]), kink: values.mask(slots[1]) }
 }
 

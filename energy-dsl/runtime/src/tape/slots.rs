@@ -72,18 +72,18 @@ impl<S: Float> Slots<S> {
         if let Some(general) = &routine.general {
             let extraordinary = !self.masks[usize::from(general.ordinary)] & present;
             if extraordinary != 0 {
-                self.run_general(routine, general, extraordinary);
+                self.run_general(general, extraordinary);
             }
         }
     }
 
     /// Replaces the results of the extraordinary elements by those of the general path.
     #[cold]
-    fn run_general(&mut self, routine: &Routine, general: &General, extraordinary: u64) {
-        let (sizes, numbers) = (routine.sizes(), self.numbers.as_chunks::<TAPE_BLOCK>().0);
+    fn run_general(&mut self, general: &General, extraordinary: u64) {
+        let numbers = self.numbers.as_chunks::<TAPE_BLOCK>().0;
         let mut replaced: Vec<Slot<S>> = self.results.iter().map(|&slot| numbers[usize::from(slot)]).collect();
         for element in (0..TAPE_BLOCK).filter(|element| extraordinary >> element & 1 == 1) {
-            let (results, flags) = general.run(routine.kind, &sizes, |input| numbers[usize::from(input)][element]);
+            let (results, flags) = general.run(|input| numbers[usize::from(input)][element]);
             replaced.iter_mut().zip(results).for_each(|(slot, result)| slot[element] = result);
             self.flags[0] |= u64::from(flags.degenerate.any()) << element;
             self.flags[1] |= u64::from(flags.kink.any()) << element;

@@ -198,13 +198,18 @@ fn general_paths_replace_the_results_that_need_them() {
     force.general = Some(General {
         ordinary: 3,
         inputs: vec![3, 4],
-        moves: vec![true; 2],
-        tape: double,
-        results: vec![3; RESULTS],
-        flags: [None; 2],
-        settled: [Some(0), None],
-        outside: None,
-        summed: RESULTS,
+        path: GeneralPath {
+            moves: vec![true; 2],
+            groups: vec![RESULTS],
+            values_first: false,
+            is_energy: false,
+            tape: double,
+            results: vec![3; RESULTS],
+            flags: [None; 2],
+            settled: [Some(0), None],
+            outside: None,
+            summed: RESULTS,
+        },
     });
     let same = [(Column::Same(&[2.0, 8.0][..]), 2)];
     let elements = TapeElements::new(Arc::new(routines), COUNT, &[(Column::Same(&[0.5]), 1)], &same).unwrap();

@@ -5,7 +5,7 @@ use crate::numbers::elementary::Format;
 use crate::numbers::lane::{Lane, check_transposed, gather_by_element, transpose_by_element};
 use crate::numbers::level::Kernel;
 use crate::numbers::real::{Mask, Number};
-use crate::numbers::unbounded::{GeneralPath, Unbounded, WithCare};
+use crate::numbers::unbounded::{Settle, Settled, Unbounded};
 
 /// A floating-point number that lanes are made of, with the bit patterns of its format.
 pub trait Scalar: Lane<Self> + Number<Mask = bool> + PartialOrd + Default {
@@ -44,14 +44,13 @@ pub trait Scalar: Lane<Self> + Number<Mask = bool> + PartialOrd + Default {
     fn power_of_two(exponent: i32) -> Self;
     /// Returns the bounds within which [`crate::Number::is_moderate`] holds.
     fn moderate_bounds(degree: u8) -> (Self, Self);
-    /// Returns the general path of a routine in this precision.
-    fn unbounded_path<W: WithCare<INPUTS, OUTPUTS>, const INPUTS: usize, const OUTPUTS: usize>()
-    -> GeneralPath<Unbounded<Self>>;
+    /// Runs the general path of a routine in this precision.
+    fn unbounded_path(path: &impl Settle, inputs: &[Unbounded<Self>]) -> Settled<Self>;
 }
 
 macro_rules! scalar {
     (
-        $float:ident, $bits:ident, $general_path:expr, $mantissa_bits:literal, $bias:literal, $splitter:literal,
+        $float:ident, $bits:ident, $settled:ident, $mantissa_bits:literal, $bias:literal, $splitter:literal,
         $moderate:literal, $span:literal, $reach:literal
     ) => {
         impl Scalar for $float {
@@ -93,27 +92,16 @@ macro_rules! scalar {
                 let power = |exponent: $bits| $float::from_bits(exponent << $mantissa_bits);
                 (power($bias - limit), power($bias + limit))
             }
-            fn unbounded_path<W: WithCare<INPUTS, OUTPUTS>, const INPUTS: usize, const OUTPUTS: usize>()
-            -> GeneralPath<Unbounded<Self>> {
-                $general_path
+            fn unbounded_path(path: &impl Settle, inputs: &[Unbounded<Self>]) -> Settled<Self> {
+                path.$settled(inputs)
             }
         }
     };
 }
 
 // Products of two full significands, and a third number shifted by the reach, are normal numbers.
-scalar!(
-    f64,
-    u64,
-    W::compiled().double,
-    52,
-    1023,
-    134_217_729.0,
-    80,
-    340_282_366_920_938_463_463_374_607_431_768_211_456.0,
-    500
-);
-scalar!(f32, u32, GeneralPath::of::<W, INPUTS, OUTPUTS>(), 23, 127, 4097.0, 12, 16.0, 95);
+scalar!(f64, u64, in_double, 52, 1023, 134_217_729.0, 80, 340_282_366_920_938_463_463_374_607_431_768_211_456.0, 500);
+scalar!(f32, u32, in_single, 23, 127, 4097.0, 12, 16.0, 95);
 
 /// A register of numbers. If it needs processor features, it is used only in kernels that run at the level of the
 /// register.
