@@ -35,7 +35,7 @@ pub(crate) struct Coupling<T> {
 }
 
 impl<T: Precision> Couplings<T> {
-    /// Creates the couplings of all domains. The `ranges` of rows make up the pattern.
+    /// Creates the couplings of all domains, whose rows make up the pattern.
     pub(super) fn all(pattern: &Pattern, cross: &CrossBlocks, triangles: &[&Triangle<T>]) -> Vec<Self> {
         let ranges = &triangles.iter().map(|triangle| triangle.rows.clone()).collect::<Vec<_>>()[..];
         let mut all: Vec<Self> = ranges.iter().map(|_| Self { couplings: Vec::new(), border: Vec::new() }).collect();
