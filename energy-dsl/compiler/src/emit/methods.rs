@@ -2,7 +2,7 @@
 //!
 //! A routine `f` becomes `f_at::<L>`, which is inlined into a caller at SIMD level L, and `f`, which runs it at the
 //! best level of the machine. If precautions were split off, `f_at` chooses between `f_if_ordinary` and `f_in_general`
-//! by `f_has_guards` and `f_is_ordinary`.
+//! by `f_has_guards` and by a mask that `f_if_ordinary` returns.
 //!
 //! For a sum of like terms, these are the routines of one term, and `f_at` is the loop over all.
 
@@ -246,12 +246,14 @@ fn method(emitter: &Emitter<'_>, routine: &RoutinePlan, owner: &Ident) -> Emitte
     let result_type = method.result_type();
     let (names, types): (Vec<_>, Vec<_>) = arguments.iter().map(|(name, of)| (name, of)).unzip();
     let arguments = quote!(&self, #(#names: &#types),*);
-    let ordinary = body(emitter, &method, routine.kind, &routine.ordinary);
     let (body, general) = match &routine.general {
-        None => (ordinary, TokenStream::new()),
+        None => {
+            let Body { statements, result, .. } = body(emitter, &method, routine.kind, &routine.ordinary);
+            (quote!(#statements #result), TokenStream::new())
+        }
         Some(general) => {
-            let [has_guards, is_ordinary, if_ordinary, in_general] =
-                ["has_guards", "is_ordinary", "if_ordinary", "in_general"].map(|form| format_ident!("{name}_{form}"));
+            let [has_guards, if_ordinary, in_general] =
+                ["has_guards", "if_ordinary", "in_general"].map(|form| format_ident!("{name}_{form}"));
             // Field by field in reverse order: passed on as a whole, the struct would live in memory on both paths.
             let field_types = fields.iter().rev().map(|field| &field.field_type);
             let parts = quote!((::energy_dsl::Flags<T>, #(#field_types),*));
@@ -267,8 +269,7 @@ fn method(emitter: &Emitter<'_>, routine: &RoutinePlan, owner: &Ident) -> Emitte
             let (path, outputs) = (encoded(emitter, routine, general), outputs(&method, general));
             let select = quote! {
                 if T::WIDE {
-                    let ordinary = self.#is_ordinary::<L>(#(#names),*);
-                    let here = self.#if_ordinary::<L>(#(#names),*);
+                    let (here, ordinary) = self.#if_ordinary::<L>(#(#names),*);
                     if ::energy_dsl::Mask::all(ordinary) {
                         return here;
                     }
@@ -277,8 +278,8 @@ fn method(emitter: &Emitter<'_>, routine: &RoutinePlan, owner: &Ident) -> Emitte
                     return ::energy_dsl::#result { #(#fields),* };
                 }
                 if ::energy_dsl::Mask::all(self.#has_guards::<L>(#(#names),*)) {
-                    let here = self.#if_ordinary::<L>(#(#names),*);
-                    if ::energy_dsl::Mask::all(self.#is_ordinary::<L>(#(#names),*)) {
+                    let (here, ordinary) = self.#if_ordinary::<L>(#(#names),*);
+                    if ::energy_dsl::Mask::all(ordinary) {
                         return here;
                     }
                 }
@@ -286,7 +287,9 @@ fn method(emitter: &Emitter<'_>, routine: &RoutinePlan, owner: &Ident) -> Emitte
                 let (#(#fields),*) = Self::#in_general(&[#(#inputs),*], ordinary, here);
                 ::energy_dsl::#result { #(#fields),* }
             };
-            let [guards, guard] = [&general.before, &general.guard].map(|code| mask(emitter, routine.kind, code));
+            let guards = mask(emitter, routine.kind, &general.before);
+            let guarded = routine.ordinary.with_guard(&general.guard, !routine.is_broken);
+            let Body { statements, result: found, guard } = body(emitter, &method, routine.kind, &guarded);
             let general = quote! {
                 /// Whether the guards of the ordinary path hold. Its results may still be infinite.
                 #[inline(always)]
@@ -294,15 +297,11 @@ fn method(emitter: &Emitter<'_>, routine: &RoutinePlan, owner: &Ident) -> Emitte
                     #guards
                 }
 
-                /// Whether the ordinary path suffices.
+                /// The ordinary path, and whether it suffices.
                 #[inline(always)]
-                fn #is_ordinary<L: ::energy_dsl::Level>(#arguments) -> T::Mask {
-                    #guard
-                }
-
-                #[inline(always)]
-                fn #if_ordinary<L: ::energy_dsl::Level>(#arguments) -> #result_type {
-                    #ordinary
+                fn #if_ordinary<L: ::energy_dsl::Level>(#arguments) -> (#result_type, T::Mask) {
+                    #statements
+                    (#found, #guard)
                 }
 
                 /// The general path, over numbers with an extended exponent. Lanes on the ordinary path do not change.
@@ -389,8 +388,16 @@ fn mask(emitter: &Emitter<'_>, kind: RoutineKind, code: &Code) -> TokenStream {
     quote!(#statements #mask)
 }
 
-/// Emits statements and the returned struct.
-fn body(emitter: &Emitter<'_>, method: &Method, kind: RoutineKind, code: &Code) -> TokenStream {
+/// The body of a method.
+struct Body {
+    statements: TokenStream,
+    /// The returned struct.
+    result: TokenStream,
+    /// The mask of its guard; false without one.
+    guard: TokenStream,
+}
+
+fn body(emitter: &Emitter<'_>, method: &Method, kind: RoutineKind, code: &Code) -> Body {
     let rendered = emitter.rendered(code, &mut |input| read_input(emitter.program, kind, input));
     let values = method.fields.iter().zip(&code.groups).map(|(Field { name, shape, .. }, group)| {
         let value = arranged(*shape, &rendered.numbers(group));
@@ -398,11 +405,11 @@ fn body(emitter: &Emitter<'_>, method: &Method, kind: RoutineKind, code: &Code) 
     });
     let values: Vec<TokenStream> = values.collect();
     let [degenerate, kink] = code.flags.map(|mask| rendered.mask(mask));
-    let (result, statements) = (&method.result, rendered.statements);
-    quote! {
-        #statements
-        ::energy_dsl::#result { #(#values,)* flags: ::energy_dsl::Flags { degenerate: #degenerate, kink: #kink } }
-    }
+    let (of, guard) = (&method.result, rendered.mask(code.guard));
+    let result = quote! {
+        ::energy_dsl::#of { #(#values,)* flags: ::energy_dsl::Flags { degenerate: #degenerate, kink: #kink } }
+    };
+    Body { statements: rendered.statements, result, guard }
 }
 
 /// Reads an input in a method.

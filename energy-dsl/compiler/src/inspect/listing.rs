@@ -96,7 +96,7 @@ impl Listing {
     /// Returns the method of a routine (`value`, `hessian`, …), with its ordinary and its general path.
     #[must_use]
     pub fn routine(&self, name: &str) -> Option<String> {
-        let parts = ["at", "has_guards", "is_ordinary", "if_ordinary", "in_general"];
+        let parts = ["at", "has_guards", "if_ordinary", "in_general"];
         let wanted = parts.map(|part| format!("{name}_{part}"));
         let methods: Vec<String> =
             methods(&self.code).into_iter().filter(|(name, _)| wanted.contains(name)).map(|(_, text)| text).collect();
