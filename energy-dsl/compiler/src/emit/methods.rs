@@ -258,15 +258,15 @@ fn method(emitter: &Emitter<'_>, routine: &RoutinePlan, owner: &Ident) -> Emitte
             let field_types = fields.iter().rev().map(|field| &field.field_type);
             let parts = quote!((::energy_dsl::Flags<T>, #(#field_types),*));
             let fields = method.reversed_fields();
-            // Lanes are computed first, while they are in registers of the level; lanes that need the general path are
-            // replaced afterwards. A scalar branches on the guards first. It looks at its results after they are
-            // computed: before the branch, they would occupy registers. Values are passed by copy: a reference would
-            // force them into memory on both paths.
             let (inputs, _) = general.inputs();
             let inputs: Vec<TokenStream> =
                 inputs.iter().map(|&input| read_input(emitter.program, routine.kind, input)).collect();
             let (reads, returns) = (inputs.len(), routine.sizes().iter().sum::<usize>());
             let (path, outputs) = (encoded(emitter, routine, general), outputs(&method, general));
+            // Lanes are computed first, while they are in registers of the level; lanes that need the general path are
+            // replaced afterwards. A scalar branches on the guards first. It looks at its results after they are
+            // computed: before the branch, they would occupy registers. Values are passed by copy: a reference would
+            // force them into memory on both paths.
             let select = quote! {
                 if T::WIDE {
                     let (here, ordinary) = self.#if_ordinary::<L>(#(#names),*);
