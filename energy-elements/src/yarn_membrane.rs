@@ -49,7 +49,7 @@ energy! {
             let t = e + w;
             w^2 * (2 * k + c) / 6 - t * ((k + c) / 2 * w - c / 2 * t)
         }
-        // One formula on both sides of e = 0: a choice between two would be a tie at rest.
+        // Both sides of e = 0 have the same derivatives up to the second: rest is no kink.
         fn yarn(e, k, a, b, m, c, w) {
             let n = min(e, 0);
             let p = max(e, 0);

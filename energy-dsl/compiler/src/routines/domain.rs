@@ -61,13 +61,13 @@ pub(super) fn without_limit(g: &mut Graph, uses: &Uses) -> Option<NodeId> {
 
 /// The use of an operation's result.
 #[derive(Clone, Copy)]
-struct Use {
+pub(super) struct Use {
     /// Where it is used.
-    mask: NodeId,
+    pub(super) mask: NodeId,
     /// Where its derivatives are used.
-    moving: NodeId,
+    pub(super) moving: NodeId,
     /// The highest order of its derivatives.
-    order: u8,
+    pub(super) order: u8,
 }
 
 /// The operations of formulas that are differentiated up to some order. A robust primitive counts as one.
@@ -107,6 +107,11 @@ impl Uses {
             }
         }
         uses
+    }
+
+    /// Returns the use of one of the operations. `None` if only conditions use it.
+    pub(super) fn of_node(&self, node: NodeId) -> Option<Use> {
+        self.0.get(&node).copied()
     }
 
     fn add(&mut self, g: &mut Graph, node: NodeId, used: Use) {

@@ -2,7 +2,8 @@
 
 use std::collections::BTreeSet;
 
-use super::domain::{Uses, outside, without_limit};
+use super::domain::{Use, Uses, outside, without_limit};
+use super::sides::agree;
 use crate::graph::{Graph, NodeId, Op};
 use energy_runtime::Flag;
 
@@ -56,39 +57,48 @@ impl Hazards {
     }
 
     /// Marks a = b, where derivatives may have two sides.
-    fn tie(&mut self, g: &mut Graph, a: NodeId, b: NodeId) {
+    fn tie(&mut self, g: &mut Graph, a: NodeId, b: NodeId, used: NodeId) {
         let equal = g.equal(a, b);
-        self.flag(g, Flag::Kink, equal);
-        let apart = g.not(equal);
+        let marked = g.and(equal, used);
+        self.flag(g, Flag::Kink, marked);
+        let apart = g.not(marked);
         self.require(g, apart);
     }
 
+    /// Marks a = b unless derivatives are the same on both sides.
+    fn tie_of_sides(&mut self, g: &mut Graph, [a, b]: [NodeId; 2], used: NodeId, roots: &[(NodeId, u8)]) {
+        let (variable, bound) = if g.as_constant(a).is_some() { (b, a) } else { (a, b) };
+        if g.as_constant(bound).is_none() || !agree(g, roots, variable, bound) {
+            self.tie(g, a, b, used);
+        }
+    }
+
     /// Marks the boundary of a condition.
-    fn boundary(&mut self, g: &mut Graph, mask: NodeId) {
+    fn boundary(&mut self, g: &mut Graph, mask: NodeId, used: NodeId, roots: &[(NodeId, u8)]) {
         match g.op(mask) {
-            Op::And(a, b) | Op::Or(a, b) => [a, b].into_iter().for_each(|mask| self.boundary(g, mask)),
-            Op::Not(a) => self.boundary(g, a),
+            Op::And(a, b) | Op::Or(a, b) => [a, b].into_iter().for_each(|mask| self.boundary(g, mask, used, roots)),
+            Op::Not(a) => self.boundary(g, a, used, roots),
             Op::Less(a, b) | Op::LessOrEqual(a, b) | Op::Equal(a, b) if g.varies(a) || g.varies(b) => {
-                self.tie(g, a, b);
-                self.edge_of_domain(g, &[a, b]);
+                self.tie_of_sides(g, [a, b], used, roots);
+                self.edge_of_domain(g, &[a, b], used);
             }
             _ => {}
         }
     }
 
     /// Marks where a compared number stops being one: beyond, the comparison fails, so that the branch changes.
-    fn edge_of_domain(&mut self, g: &mut Graph, compared: &[NodeId]) {
+    fn edge_of_domain(&mut self, g: &mut Graph, compared: &[NodeId], used: NodeId) {
         for node in operations(g, compared) {
             if let Op::Ln(x) | Op::Sqrt(x) | Op::Pow(x, _) = g.op(node)
                 && g.varies(x)
             {
                 let zero = g.constant(0.0);
-                self.tie(g, x, zero);
+                self.tie(g, x, zero, used);
             }
         }
     }
 
-    fn operation(&mut self, g: &mut Graph, node: NodeId, order: u8) {
+    fn operation(&mut self, g: &mut Graph, node: NodeId, order: u8, used: Use, roots: &[(NodeId, u8)]) {
         let zero = g.constant(0.0);
         match g.op(node) {
             Op::Div(_, b) if g.as_constant(b).is_none() => {
@@ -125,14 +135,14 @@ impl Hazards {
                 let at_zero = g.equal(square, zero);
                 self.flag(g, Flag::Kink, at_zero);
             }
-            Op::Abs(a) if order >= 1 => self.tie(g, a, zero),
+            Op::Abs(a) if order >= 1 => self.tie_of_sides(g, [a, zero], used.moving, roots),
             Op::Min(a, b) | Op::Max(a, b) if order >= 1 => {
                 // If one is NaN, the other one is returned.
                 let sum = g.add(a, b);
                 self.require_finite(g, sum);
-                self.tie(g, a, b);
+                self.tie_of_sides(g, [a, b], used.moving, roots);
             }
-            Op::Select(mask, ..) => self.boundary(g, mask),
+            Op::Select(mask, ..) => self.boundary(g, mask, used.mask, roots),
             _ => {}
         }
     }
@@ -142,8 +152,15 @@ impl Hazards {
 pub(super) fn hazards(g: &mut Graph, roots: &[(NodeId, u8)]) -> Hazards {
     let uses = Uses::of(g, roots);
     let mut found = Hazards { outside: outside(g, &uses), definite: without_limit(g, &uses), ..Hazards::default() };
+    let (always, never) = (g.truth(true), g.truth(false));
     for &(root, order) in roots {
-        for node in operations(g, &[root]) {
+        let all = operations(g, &[root]);
+        let conditions: Vec<NodeId> = all.iter().filter_map(|&node| condition(g, node)).collect();
+        let compared = operations(g, &conditions);
+        for node in all {
+            // Conditions need values, but no derivatives.
+            let used = uses.of_node(node).unwrap_or(Use { mask: always, moving: never, order: 0 });
+            let used = if compared.contains(&node) { Use { mask: always, ..used } } else { used };
             match g.rule(node) {
                 Some(rule) => {
                     let saturates = order >= 1 && rule.primitive.saturates();
@@ -153,11 +170,19 @@ pub(super) fn hazards(g: &mut Graph, roots: &[(NodeId, u8)]) -> Hazards {
                     }
                     saturated.into_iter().for_each(|argument| found.require_finite(g, argument));
                 }
-                None => found.operation(g, node, order),
+                None => found.operation(g, node, order, used, roots),
             }
         }
     }
     found
+}
+
+/// Returns the condition of a selection.
+fn condition(g: &Graph, node: NodeId) -> Option<NodeId> {
+    match (g.rule(node), g.op(node)) {
+        (None, Op::Select(mask, ..)) => Some(mask),
+        _ => None,
+    }
 }
 
 /// Returns the operations that `roots` depend on. A robust primitive counts as one, but for what users wrote inside.

@@ -6,6 +6,7 @@ mod hazards;
 mod magnitude;
 mod memory;
 mod range;
+mod sides;
 
 use rustc_hash::FxHashMap;
 
