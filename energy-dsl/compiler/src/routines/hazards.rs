@@ -199,3 +199,55 @@ pub(super) fn operations(g: &Graph, roots: &[NodeId]) -> BTreeSet<NodeId> {
     }
     seen
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::graph::{Input, Interpreter};
+    use energy_runtime::Inputs;
+
+    /// Returns whether t = `at` is marked as a kink of a function of t, up to the second derivatives.
+    fn is_kink(at: f64, formula: impl Fn(&mut Graph, NodeId) -> NodeId) -> bool {
+        let mut g = Graph::robust(&[]);
+        let t = g.input(Input::Position(0));
+        let root = formula(&mut g, t);
+        let Some(mask) = hazards(&mut g, &[(root, 2)]).flags[1] else { return false };
+        let inputs = Inputs { parameters: &[], rest: &[], positions: &[at], velocities: &[] };
+        Interpreter::new(&g, &[mask]).masks::<f64>(&inputs)[0]
+    }
+
+    #[test]
+    fn a_kink_counts_where_its_derivatives_are_used() {
+        // t² where |t| < b, and |t| + t⁴ elsewhere.
+        let branches = |b: f64| {
+            move |g: &mut Graph, t: NodeId| {
+                let (size, square, bound) = (g.abs(t), g.mul(t, t), g.constant(b));
+                let (fourth, inside) = (g.mul(square, square), g.less(size, bound));
+                let outside = g.add(size, fourth);
+                g.select(inside, square, outside)
+            }
+        };
+        assert!(!is_kink(0.0, branches(1.0)));
+        assert!(is_kink(1.0, branches(1.0)) && is_kink(-1.0, branches(1.0)));
+        assert!(is_kink(0.0, branches(-1.0)));
+        // Conditions need no derivatives: |t| < 1 as such has none at t = 0, the jump at its ends is marked.
+        let indicator = |g: &mut Graph, t: NodeId| {
+            let (size, one, two) = (g.abs(t), g.constant(1.0), g.constant(2.0));
+            let inside = g.less(size, one);
+            g.select(inside, one, two)
+        };
+        assert!(!is_kink(0.0, indicator) && is_kink(1.0, indicator));
+    }
+
+    #[test]
+    fn smooth_joints_are_no_kinks() {
+        let one_sided = |exponent: usize| {
+            move |g: &mut Graph, t: NodeId| {
+                let zero = g.constant(0.0);
+                let part = g.min(t, zero);
+                (1..exponent).fold(part, |power, _| g.mul(power, part))
+            }
+        };
+        assert!(is_kink(0.0, one_sided(1)) && is_kink(0.0, one_sided(2)) && !is_kink(0.0, one_sided(3)));
+    }
+}

@@ -63,7 +63,7 @@ pub struct NewtonOptions {
     pub impulse_tolerance: f64,
     /// A step fails after this many iterations.
     pub iteration_limit: usize,
-    /// Residual of each linear system relative to its right-hand side. Loosened by up to a factor of ten while Newton's
+    /// Residual of each linear system relative to its right-hand side. Loosened by up to a factor of four while Newton's
     /// method converges slowly.
     pub linear_tolerance: f64,
     /// The solver of the linear systems.
