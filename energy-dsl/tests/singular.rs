@@ -17,7 +17,6 @@ energy! {
     energy DomainEdge(p: Point) { if log(p.y) < 0 { p.x } else { p.x^2 } }
     energy Jump(p: Point) { if p.x > 0 { 1 } else { 0 } }
     energy Joint(p: Point) { max(p.x, 0)^3 - min(p.y, 0)^4 + abs(p.z)^3 + p.x }
-    energy Exception(p: Point) { if p.x == 0 { 0 } else { p.x + p.x^2 } }
     energy Sum(p: Point) { norm(p) * norm(p) + unit(p).x * norm(p) }
     energy Quadratic(p, q: Point; k: Scalar) { k * norm_squared(p - q) }
     energy Deep(p: Point) { (1 - cos(norm(p))) / norm_squared(p) }
@@ -122,9 +121,6 @@ fn joints_with_equal_second_derivatives_are_regular() {
     let joint = Joint::<f64>::new().hessian(&[ORIGIN]);
     assert_eq!((joint.value, joint.gradient, flags(&joint)), (0.0, [[1.0, 0.0, 0.0]], (false, false)));
     assert_eq!(joint.hessian[0], [ORIGIN; 3]);
-    // The value of one point, beside a branch with other derivatives.
-    let exception = Exception::<f64>::new().hessian(&[ORIGIN]);
-    assert_eq!((exception.value, exception.gradient[0][0], exception.hessian[0][0][0]), (0.0, 1.0, 2.0));
 }
 
 #[test]
