@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use super::domain::{Use, Uses, outside, without_limit};
-use super::sides::agree;
+use super::sides::Sides;
 use crate::graph::{Graph, NodeId, Op};
 use energy_runtime::Flag;
 
@@ -66,20 +66,20 @@ impl Hazards {
     }
 
     /// Marks a = b unless derivatives are the same on both sides.
-    fn tie_of_sides(&mut self, g: &mut Graph, [a, b]: [NodeId; 2], used: NodeId, roots: &[(NodeId, u8)]) {
+    fn tie_of_sides(&mut self, g: &mut Graph, [a, b]: [NodeId; 2], used: NodeId, sides: &mut Sides<'_>) {
         let (variable, bound) = if g.as_constant(a).is_some() { (b, a) } else { (a, b) };
-        if g.as_constant(bound).is_none() || !agree(g, roots, variable, bound) {
+        if g.as_constant(bound).is_none() || !sides.agree(g, variable, bound) {
             self.tie(g, a, b, used);
         }
     }
 
     /// Marks the boundary of a condition.
-    fn boundary(&mut self, g: &mut Graph, mask: NodeId, used: NodeId, roots: &[(NodeId, u8)]) {
+    fn boundary(&mut self, g: &mut Graph, mask: NodeId, used: NodeId, sides: &mut Sides<'_>) {
         match g.op(mask) {
-            Op::And(a, b) | Op::Or(a, b) => [a, b].into_iter().for_each(|mask| self.boundary(g, mask, used, roots)),
-            Op::Not(a) => self.boundary(g, a, used, roots),
+            Op::And(a, b) | Op::Or(a, b) => [a, b].into_iter().for_each(|mask| self.boundary(g, mask, used, sides)),
+            Op::Not(a) => self.boundary(g, a, used, sides),
             Op::Less(a, b) | Op::LessOrEqual(a, b) | Op::Equal(a, b) if g.varies(a) || g.varies(b) => {
-                self.tie_of_sides(g, [a, b], used, roots);
+                self.tie_of_sides(g, [a, b], used, sides);
                 self.edge_of_domain(g, &[a, b], used);
             }
             _ => {}
@@ -98,7 +98,7 @@ impl Hazards {
         }
     }
 
-    fn operation(&mut self, g: &mut Graph, node: NodeId, order: u8, used: Use, roots: &[(NodeId, u8)]) {
+    fn operation(&mut self, g: &mut Graph, node: NodeId, order: u8, used: Use, sides: &mut Sides<'_>) {
         let zero = g.constant(0.0);
         match g.op(node) {
             Op::Div(_, b) if g.as_constant(b).is_none() => {
@@ -135,14 +135,14 @@ impl Hazards {
                 let at_zero = g.equal(square, zero);
                 self.flag(g, Flag::Kink, at_zero);
             }
-            Op::Abs(a) if order >= 1 => self.tie_of_sides(g, [a, zero], used.moving, roots),
+            Op::Abs(a) if order >= 1 => self.tie_of_sides(g, [a, zero], used.moving, sides),
             Op::Min(a, b) | Op::Max(a, b) if order >= 1 => {
                 // If one is NaN, the other one is returned.
                 let sum = g.add(a, b);
                 self.require_finite(g, sum);
-                self.tie_of_sides(g, [a, b], used.moving, roots);
+                self.tie_of_sides(g, [a, b], used.moving, sides);
             }
-            Op::Select(mask, ..) => self.boundary(g, mask, used.mask, roots),
+            Op::Select(mask, ..) => self.boundary(g, mask, used.mask, sides),
             _ => {}
         }
     }
@@ -153,6 +153,7 @@ pub(super) fn hazards(g: &mut Graph, roots: &[(NodeId, u8)]) -> Hazards {
     let uses = Uses::of(g, roots);
     let mut found = Hazards { outside: outside(g, &uses), definite: without_limit(g, &uses), ..Hazards::default() };
     let (always, never) = (g.truth(true), g.truth(false));
+    let mut sides = Sides::new(roots);
     for &(root, order) in roots {
         let all = operations(g, &[root]);
         let conditions: Vec<NodeId> = all.iter().filter_map(|&node| condition(g, node)).collect();
@@ -170,7 +171,7 @@ pub(super) fn hazards(g: &mut Graph, roots: &[(NodeId, u8)]) -> Hazards {
                     }
                     saturated.into_iter().for_each(|argument| found.require_finite(g, argument));
                 }
-                None => found.operation(g, node, order, used, roots),
+                None => found.operation(g, node, order, used, &mut sides),
             }
         }
     }

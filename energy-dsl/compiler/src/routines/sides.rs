@@ -1,16 +1,35 @@
 //! Kinks that derivatives do not notice, as that of max(t, 0)³.
 
 use std::cmp::Ordering;
+use std::collections::BTreeMap;
 
 use crate::diff::{Coordinates, Order, first_derivatives, second_derivatives};
 use crate::graph::{Graph, NodeId, Op, Substitution};
+
+/// Formulas, each up to an order of its derivatives, and where their sides were compared.
+pub(super) struct Sides<'a> {
+    roots: &'a [(NodeId, u8)],
+    known: BTreeMap<[NodeId; 2], bool>,
+}
+
+impl<'a> Sides<'a> {
+    pub(super) fn new(roots: &'a [(NodeId, u8)]) -> Self {
+        Self { roots, known: BTreeMap::new() }
+    }
+
+    /// Returns whether the sides of t = c agree. Several operations may compare the same numbers.
+    pub(super) fn agree(&mut self, g: &Graph, t: NodeId, c: NodeId) -> bool {
+        let roots = self.roots;
+        *self.known.entry([t, c]).or_insert_with(|| agree(g, roots, t, c))
+    }
+}
 
 /// Returns whether formulas and their derivatives, up to the given orders, are the same at t = c and on both sides of it,
 /// as far as comparisons of t with c decide.
 ///
 /// Each formula is a function of t and of the other inputs. If it and its first two derivatives by t are the same
 /// expressions for all outcomes of these comparisons, then so are all derivatives by other inputs.
-pub(super) fn agree(g: &Graph, roots: &[(NodeId, u8)], t: NodeId, c: NodeId) -> bool {
+fn agree(g: &Graph, roots: &[(NodeId, u8)], t: NodeId, c: NodeId) -> bool {
     // What this creates must not count among the nodes of the routines.
     let mut g = g.clone();
     roots.iter().all(|&(root, order)| {
@@ -97,7 +116,7 @@ mod tests {
 
     #[test]
     fn branches_are_compared() {
-        // y t² on one side, s t³ or t² y + 1 on the other.
+        // y t² on one side, t³ or y t² + 1 on the other.
         let select = |shift: f64| {
             order_of(move |g, t, y| {
                 let (zero, shift) = (g.constant(0.0), g.constant(shift));
