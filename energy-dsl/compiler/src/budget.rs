@@ -154,6 +154,8 @@ struct Account {
     trusting: bool,
     steps: AtomicU64,
     bytes: AtomicU64,
+    /// The limit of steps, or that of an attempt.
+    most_steps: AtomicU64,
     /// Number of steps at which the limits and the watch are asked next.
     next: AtomicU64,
     phase: AtomicU8,
@@ -177,6 +179,7 @@ impl Budget {
             trusting: false,
             steps: AtomicU64::new(0),
             bytes: AtomicU64::new(0),
+            most_steps: AtomicU64::new(limits.steps),
             next: AtomicU64::new(0),
             phase: AtomicU8::new(0),
             binding: AtomicUsize::new(0),
@@ -302,14 +305,15 @@ impl Budget {
 
     #[cold]
     fn look(&self, steps: u64, bytes: u64) -> Result<(), Stop> {
-        let Account { limits, next, cancelled, watch, .. } = &*self.0;
-        if steps > limits.steps {
+        let Account { limits, most_steps, next, cancelled, watch, .. } = &*self.0;
+        let most = most_steps.load(Ordering::Relaxed);
+        if steps > most {
             return Err(Stop::Steps);
         }
         if bytes > limits.bytes {
             return Err(Stop::Bytes);
         }
-        next.store(steps.saturating_add(LOOK).min(limits.steps.saturating_add(1)), Ordering::Relaxed);
+        next.store(steps.saturating_add(LOOK).min(most.saturating_add(1)), Ordering::Relaxed);
         let is_cancelled = cancelled.as_ref().is_some_and(|flag| flag.load(Ordering::Relaxed));
         let ends = watch.as_ref().is_some_and(|watch| watch(&self.progress()).is_break());
         if is_cancelled || ends { Err(Stop::Cancelled) } else { Ok(()) }
@@ -323,6 +327,28 @@ impl Budget {
             Ok(stop) => *stop,
             Err(panic) => resume_unwind(panic),
         })
+    }
+}
+
+impl Budget {
+    /// Runs a part that may be given up: `None` if it takes more than `most` steps, or half of those that are left, or
+    /// more memory than is left. What it spends is returned, and not counted.
+    pub(crate) fn attempt<T>(&self, most: u64, part: impl FnOnce() -> T) -> Option<(T, [u64; 2])> {
+        let Progress { steps, bytes, limits, .. } = self.progress();
+        let most = steps.saturating_add(most.min(limits.steps.saturating_sub(steps) / 2));
+        let limit = self.0.most_steps.swap(most, Ordering::Relaxed);
+        // The limits are asked at the first step.
+        self.0.next.store(steps, Ordering::Relaxed);
+        let outcome = self.within(part);
+        let after = self.progress();
+        self.0.most_steps.store(limit, Ordering::Relaxed);
+        let counters = [(&self.0.steps, steps), (&self.0.bytes, bytes), (&self.0.next, steps)];
+        counters.into_iter().for_each(|(counter, before)| counter.store(before, Ordering::Relaxed));
+        match outcome {
+            Ok(done) => Some((done, [after.steps - steps, after.bytes - bytes])),
+            Err(Stop::Cancelled) => Self::stop(Stop::Cancelled),
+            Err(_) => None,
+        }
     }
 }
 

@@ -78,7 +78,8 @@ fn sum(terms: &str, more: &str) -> String {
             rest {{ let v = w; }}
             fn term(k, v, s, a, b, c, d) {{
                 let M = columns(b - a, c - a, d - a) * s;
-                k * v * det(inverse(transpose(M) * M + identity(3)))^3 / (1 + norm(M * vector(s, 1, 2)))
+                let r = 1 + norm(M * vector(s, 1, 2)) + norm(M * vector(1, s, 2));
+                k * v * det(inverse(transpose(M) * M + identity(3)))^3 / r
             }}
             {terms}{more}
         }}"

@@ -3,10 +3,11 @@
 use std::collections::BTreeMap;
 
 use super::coordinates::Coordinates;
-use super::forward::{Sparse, products, tangents};
+use super::forward::{Sparse, tangents, tangents_by};
 use super::local::{Order, local};
+use super::outer_products::Summation;
 use super::{accumulate, differentiable};
-use crate::graph::{Contraction, Graph, NodeId, Op, upper};
+use crate::graph::{Graph, NodeId, Op, upper};
 
 /// Nodes and their weights.
 pub(super) type Weighted = BTreeMap<NodeId, NodeId>;
@@ -20,7 +21,22 @@ pub(super) fn alone(g: &mut Graph, output: NodeId) -> Weighted {
 fn adjoints(g: &mut Graph, outputs: &Weighted, coordinates: &Coordinates, order: Order) -> Weighted {
     let mut adjoints = outputs.clone();
     let roots: Vec<NodeId> = outputs.keys().copied().collect();
-    for node in differentiable(g, &roots, order).into_iter().rev() {
+    let nodes = differentiable(g, &roots, order);
+    let contractions = g.contractions_of(|value| nodes.contains(&value) && !coordinates.seeds.contains_key(&value));
+    for node in nodes.iter().copied().rev() {
+        let contraction = contractions.iter().find(|contraction| contraction.values.contains(&node));
+        if let Some((contraction, first)) = contraction.and_then(|known| Some((known, known.first?))) {
+            // At the first of the values, the weights of all are known.
+            if contraction.values.iter().find(|value| nodes.contains(value)) == Some(&node) {
+                let weights = contraction.weights(g, |value| adjoints.get(&value).copied());
+                for (&argument, slope) in contraction.arguments.iter().zip(first(g, &contraction.factors, &weights)) {
+                    if g.varies(argument) {
+                        accumulate(g, &mut adjoints, argument, slope);
+                    }
+                }
+            }
+            continue;
+        }
         let Some(&weight) = adjoints.get(&node) else { continue };
         if coordinates.seeds.contains_key(&node) {
             continue;
@@ -65,31 +81,30 @@ pub(super) fn gradient(
     Some(gathered(g, &adjoints, coordinates))
 }
 
-/// Returns Σ weight · ∇²output as a sum over nodes v: the adjoint of v times Σ φ_ab ∇a ∇bᵀ, where φ are the second
-/// derivatives of the operation at v. `None` if that is not safe on the ordinary path.
-pub(super) fn second_derivatives(
+/// Adds Σ weight · ∇²output to the sums. It is a sum over nodes v: the adjoint of v times Σ φ_ab ∇a ∇bᵀ, where φ are the
+/// second derivatives of the operation at v. `None` if that is not safe on the ordinary path.
+pub(super) fn second_derivatives<S: Summation>(
     g: &mut Graph,
     outputs: &Weighted,
     coordinates: &Coordinates,
-) -> Option<BTreeMap<usize, NodeId>> {
+    mut sums: S,
+) -> Option<S> {
     let roots: Vec<NodeId> = outputs.keys().copied().collect();
     if !is_safe(g, &roots, Order::Second, false) {
         return None;
     }
     let nodes = differentiable(g, &roots, Order::Second);
-    let n = coordinates.len();
-    let tangents = tangents(g, &roots, coordinates, Order::Second);
+    let tangents = tangents_by(g, &roots, coordinates, Order::Second, &sums);
     let adjoints = adjoints(g, outputs, coordinates, Order::Second);
-    let mut hessian: BTreeMap<usize, NodeId> = BTreeMap::new();
     let none = Sparse::new();
     let contractions = g.contractions_of(|value| nodes.contains(&value) && !coordinates.seeds.contains_key(&value));
-    for Contraction { values, arguments, factors, second } in &contractions {
-        let zero = g.constant(0.0);
-        let weights: Vec<NodeId> = values.iter().map(|value| adjoints.get(value).copied().unwrap_or(zero)).collect();
-        let entries = second(g, factors, &weights);
-        for ((i, j), entry) in upper(arguments.len()).zip(entries) {
-            let [a, b] = [i, j].map(|k| tangents.get(&arguments[k]).unwrap_or(&none));
-            add_products(g, &mut hessian, entry, (a, b), i == j, n);
+    for contraction in &contractions {
+        let weights = contraction.weights(g, |value| adjoints.get(&value).copied());
+        let entries = (contraction.second)(g, &contraction.factors, &weights);
+        sums.next();
+        for ((i, j), entry) in upper(contraction.arguments.len()).zip(entries) {
+            let [a, b] = [i, j].map(|k| tangents.get(&contraction.arguments[k]).unwrap_or(&none));
+            sums.add(g, &entry, (a, b), i == j);
         }
     }
     for node in nodes {
@@ -99,31 +114,15 @@ pub(super) fn second_derivatives(
         }
         let Some(&weight) = adjoints.get(&node) else { continue };
         let local = local(g, node, Order::Second);
+        sums.next();
         for (i, j, products_of) in local.second {
             let a = tangents.get(&local.operands[i]).unwrap_or(&none);
             let b = tangents.get(&local.operands[j]).unwrap_or(&none);
             let weight = g.sum_of_products(Some(weight), &products_of);
-            add_products(g, &mut hessian, weight, (a, b), i == j, n);
+            sums.add(g, &[weight], (a, b), i == j);
         }
     }
-    Some(hessian)
-}
-
-/// Adds weight · a aᵀ, or weight · (a bᵀ + b aᵀ).
-fn add_products(
-    g: &mut Graph,
-    hessian: &mut BTreeMap<usize, NodeId>,
-    weight: NodeId,
-    (a, b): (&Sparse, &Sparse),
-    same: bool,
-    n: usize,
-) {
-    // Weights the shorter factor, which takes fewer products.
-    let (shorter, longer) = if a.len() <= b.len() { (a, b) } else { (b, a) };
-    let weighted: Sparse = shorter.iter().map(|&(c, part)| (c, g.mul(weight, part))).collect();
-    for (place, term) in products(g, &weighted, longer, same, n) {
-        accumulate(g, hessian, place, term);
-    }
+    Some(sums)
 }
 
 /// Returns ∇²output · w by second-order reverse accumulation: with each adjoint flows its derivative along w. The

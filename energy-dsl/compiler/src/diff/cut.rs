@@ -6,9 +6,10 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::adjoint::{self, Weighted};
 use super::coordinates::Coordinates;
-use super::forward::{self, Sparse, combine, tangents};
+use super::forward::{self, Sparse};
 use super::local::Order;
-use super::{accumulate, differentiable, is_computed_otherwise, moving_operands};
+use super::outer_products::{AsTheyCome, Summation};
+use super::{differentiable, is_computed_otherwise, moving_operands};
 use crate::graph::{Graph, NodeId, Op, count, ordinary};
 
 /// The fewest nodes of a cut above which other cuts are looked for.
@@ -54,15 +55,16 @@ pub(super) fn derivatives(
     cut: &[NodeId],
     coordinates: &Coordinates,
     known: &mut ByCut,
+    sums: impl Summation,
 ) -> Option<Gathered> {
-    let n = coordinates.len();
     let Gathered { gradient: slopes, hessian: curvatures, safe } = by_cut(g, output, cut, known);
     let safe = safe && adjoint::is_safe(g, cut, Order::Second, true);
     let weights: Weighted = cut.iter().copied().zip(slopes).collect();
     let gradient = adjoint::gradient(g, &weights, coordinates, Order::Second)?;
-    let mut hessian = adjoint::second_derivatives(g, &weights, coordinates)?;
+    let mut sums = adjoint::second_derivatives(g, &weights, coordinates, sums)?;
 
-    let tangents = tangents(g, cut, coordinates, Order::Second);
+    let tangents = forward::tangents_by(g, cut, coordinates, Order::Second, &sums);
+    sums.next();
     let none = Sparse::new();
     let m = cut.len();
     for (row, node) in cut.iter().enumerate() {
@@ -72,17 +74,16 @@ pub(super) fn derivatives(
                 Some((factor, tangents.get(&cut[column])?))
             })
             .collect();
-        let weighted = combine(g, &terms);
+        let weighted = sums.combine(g, &terms);
         for &(i, x) in &weighted {
             for &(j, y) in tangents.get(node).unwrap_or(&none) {
                 if i <= j {
-                    let term = g.mul(x, y);
-                    accumulate(g, &mut hessian, i * n + j, term);
+                    sums.add_to_entry(g, (i, j), x, y);
                 }
             }
         }
     }
-    Some(Gathered { gradient, hessian, safe })
+    Some(Gathered { gradient, hessian: sums.entries(g), safe })
 }
 
 /// Returns ∇U through the nodes of a cut of what first derivatives pass through, and whether it is right everywhere;
@@ -112,9 +113,10 @@ fn by_cut(g: &mut Graph, output: NodeId, cut: &[NodeId], known: &mut ByCut) -> G
     let coordinates = Coordinates::of_nodes(g, cut);
     let whole = adjoint::alone(g, output);
     let slopes = adjoint::gradient(g, &whole, &coordinates, Order::Second);
-    let curvatures = adjoint::second_derivatives(g, &whole, &coordinates);
+    let curvatures = adjoint::second_derivatives(g, &whole, &coordinates, AsTheyCome::new(coordinates.len()));
     let mut best = match (slopes, curvatures) {
-        (Some(gradient), Some(hessian)) => {
+        (Some(gradient), Some(sums)) => {
+            let hessian = sums.entries(g);
             Gathered { gradient, hessian, safe: adjoint::is_safe(g, &[output], Order::Second, true) }
         }
         _ => {
@@ -130,7 +132,8 @@ fn by_cut(g: &mut Graph, output: NodeId, cut: &[NodeId], known: &mut ByCut) -> G
         if !known.goes_on(g) {
             break;
         }
-        if let Some(found) = derivatives(g, output, &waist, &coordinates, known) {
+        let sums = AsTheyCome::new(coordinates.len());
+        if let Some(found) = derivatives(g, output, &waist, &coordinates, known, sums) {
             let cost = found.cost(g);
             if cost < least {
                 (best, least) = (found, cost);
@@ -266,22 +269,24 @@ pub(super) fn primitives(g: &Graph, output: NodeId, coordinates: &Coordinates) -
     let mut above: BTreeSet<NodeId> = BTreeSet::new();
     let mut cut = Vec::new();
     for &node in &nodes {
-        let operands: Vec<NodeId> = match g.rule(node) {
-            Some(rule) if rule.second.is_some() => rule.arguments.clone(),
+        let (is_primitive, operands): (_, Vec<NodeId>) = match g.rule(node) {
+            Some(rule) if g.is_spelled_out(rule) => (false, vec![rule.value]),
+            Some(rule) if rule.second.is_some() => (true, rule.arguments.clone()),
             Some(_) => return None,
-            None => g.op(node).operands().collect(),
+            None => (false, g.op(node).operands().collect()),
         };
         let fed = operands.iter().any(|o| above.contains(o));
-        if matches!(g.op(node), Op::Rule(_)) && !fed {
+        if is_primitive && !fed {
             cut.push(node);
         }
-        if fed || matches!(g.op(node), Op::Rule(_)) {
+        if fed || is_primitive {
             above.insert(node);
         }
     }
     // A path around the primitives ends in a node above them that also reads a node below.
     let bypassed = nodes.iter().filter(|&&node| above.contains(&node) && !cut.contains(&node)).any(|&node| {
         let operands: Vec<NodeId> = match g.rule(node) {
+            Some(rule) if g.is_spelled_out(rule) => vec![rule.value],
             Some(rule) => rule.arguments.clone(),
             None => match g.op(node) {
                 Op::Select(_, yes, no) => vec![yes, no],

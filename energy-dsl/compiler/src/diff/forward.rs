@@ -2,6 +2,7 @@ use std::collections::BTreeMap;
 
 use super::coordinates::Coordinates;
 use super::local::{Order, local};
+use super::outer_products::{AsTheyCome, Summation};
 use super::{accumulate, differentiable};
 use crate::graph::{ComputedAs, Graph, NodeId, Op};
 
@@ -42,6 +43,17 @@ pub(super) fn tangents(
     coordinates: &Coordinates,
     order: Order,
 ) -> BTreeMap<NodeId, Sparse> {
+    tangents_by(g, outputs, coordinates, order, &AsTheyCome::default())
+}
+
+/// Returns the same, with sums that are added up in some way.
+pub(super) fn tangents_by(
+    g: &mut Graph,
+    outputs: &[NodeId],
+    coordinates: &Coordinates,
+    order: Order,
+    sums: &impl Summation,
+) -> BTreeMap<NodeId, Sparse> {
     let mut tangents: BTreeMap<NodeId, Sparse> = coordinates.seeds.clone();
     for node in differentiable(g, outputs, order) {
         if tangents.contains_key(&node) {
@@ -59,7 +71,7 @@ pub(super) fn tangents(
                 let factors: Vec<_> = local.first.iter().map(|f| g.product(None, f)).collect();
                 let terms: Vec<_> =
                     local.operands.iter().zip(factors).filter_map(|(o, f)| Some((f, tangents.get(o)?))).collect();
-                combine(g, &terms)
+                sums.combine(g, &terms)
             }
         };
         tangents.insert(node, parts);

@@ -1,3 +1,4 @@
+use super::is_by_value;
 use crate::graph::{ComputedAs, Graph, NodeId, Op, Product, symmetric_index};
 
 /// The orders of derivatives to take.
@@ -123,18 +124,17 @@ fn of_rule(g: &mut Graph, node: NodeId, order: Order) -> Local {
         return Local::linear(vec![operand], vec![g.constant(1.0)]);
     }
     let rule = g.rule(node).expect("a rule").clone();
+    if is_by_value(g, &rule, order) {
+        return Local::linear(vec![rule.value], vec![g.constant(1.0)]);
+    }
     let n = rule.arguments.len();
-    let second = match (order, &rule.second) {
+    let second = match (order, rule.second) {
         (Order::First, _) => return Local { operands: rule.arguments, first: rule.first, second: Vec::new() },
         (Order::FirstToDifferentiate, _) => {
             let first = (0..n).map(|i| g.partial(node, i)).collect();
             return Local::linear(rule.arguments, first);
         }
-        (Order::Second, None) => {
-            let one = g.constant(1.0);
-            return Local::linear(vec![rule.value], vec![one]);
-        }
-        (Order::Second, Some(second)) => second,
+        (Order::Second, second) => second.unwrap_or_default(),
     };
     let second = (0..n)
         .flat_map(|i| (i..n).map(move |j| (i, j)))

@@ -10,9 +10,11 @@ mod coordinates;
 mod cut;
 mod dihedral;
 mod expand;
+mod factored;
 mod forward;
 mod linear;
 mod local;
+mod outer_products;
 mod routes;
 mod unknowns;
 mod weights;
@@ -26,7 +28,7 @@ pub use unknowns::{Moving, Unknown, Unknowns, by_increments};
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::graph::{ComputedAs, Graph, NodeId, Op};
+use crate::graph::{ComputedAs, Graph, NodeId, Op, Rule};
 
 /// Returns the nodes through which `outputs` depend on moving inputs, in topological order.
 fn differentiable(graph: &Graph, outputs: &[NodeId], order: Order) -> BTreeSet<NodeId> {
@@ -52,13 +54,22 @@ fn moving_operands(graph: &Graph, node: NodeId, order: Order) -> Vec<NodeId> {
         };
     }
     match graph.rule(node) {
-        Some(rule) if order == Order::Second && rule.second.is_none() => vec![rule.value],
+        Some(rule) if is_by_value(graph, rule, order) => vec![rule.value],
         Some(rule) => rule.arguments.clone(),
         None => match graph.op(node) {
             Op::Select(_, yes, no) => vec![yes, no],
             op if op.is_mask() || op.is_constant_in_exact_arithmetic() => Vec::new(),
             op => op.operands().collect(),
         },
+    }
+}
+
+/// Returns whether the derivatives of a rule are those of its value.
+fn is_by_value(graph: &Graph, rule: &Rule, order: Order) -> bool {
+    match order {
+        Order::First => graph.is_spelled_out(rule),
+        Order::FirstToDifferentiate => rule.primitive.is_rational(),
+        Order::Second => rule.second.is_none() || graph.is_spelled_out(rule),
     }
 }
 

@@ -3,8 +3,10 @@
 use std::collections::BTreeMap;
 
 use super::coordinates::Coordinates;
+use super::factored::Factored;
 use super::local::Order;
-use super::{adjoint, cut, forward, is_computed_otherwise};
+use super::outer_products::{AsTheyCome, Summation};
+use super::{adjoint, cut, differentiable, forward, is_computed_otherwise};
 use crate::graph::{Graph, NodeId, count, ordinary, symmetric_index};
 use energy_runtime::OperationCount;
 
@@ -20,12 +22,16 @@ pub struct SecondOrder {
 }
 
 /// A route to derivatives, and its cost.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Route {
     /// Name of the route.
     pub name: &'static str,
     /// The numbers where derivatives are gathered, if they are.
     pub gathered_at: Option<usize>,
+    /// Whether common factors are taken out of sums of products.
+    pub factored: bool,
+    /// Whether inverses of matrices are differentiated as if their entries were spelled out.
+    pub spelled_out: bool,
     /// Operations, including those of the value.
     pub count: OperationCount,
     /// Cost according to [`OperationCount::cost`].
@@ -45,20 +51,28 @@ pub struct Routes {
 struct Alternative {
     name: &'static str,
     gathered_at: Option<usize>,
+    factored: bool,
+    spelled_out: bool,
     /// Its derivatives.
     nodes: Vec<NodeId>,
     /// Whether it is right everywhere, not only on the ordinary path.
     safe: bool,
 }
 
+impl Alternative {
+    fn new(g: &Graph, name: &'static str, nodes: Vec<NodeId>, safe: bool) -> Self {
+        Self { name, gathered_at: None, factored: false, spelled_out: g.spells_out(), nodes, safe }
+    }
+}
+
 /// Returns the derivatives by the cheapest route on the ordinary path (the first of equals). If that route is not safe
-/// everywhere, the general path uses the cheapest safe one.
-fn choose(
+/// everywhere, the general path uses the cheapest safe one. `None` if no route is safe.
+fn cheapest(
     g: &mut Graph,
     routine: &'static str,
     values: &[NodeId],
     alternatives: &[Alternative],
-) -> (Vec<NodeId>, Routes) {
+) -> Option<(Vec<NodeId>, Routes)> {
     let mut order: Vec<(usize, Route)> = Vec::with_capacity(alternatives.len());
     for (number, alternative) in alternatives.iter().enumerate() {
         let nodes = [values, &alternative.nodes].concat();
@@ -68,72 +82,171 @@ fn choose(
             None if !alternative.safe => continue,
             None => count(g, &nodes),
         };
-        let (name, gathered_at) = (alternative.name, alternative.gathered_at);
-        order.push((number, Route { name, gathered_at, count, cost: count.cost() }));
+        let &Alternative { name, gathered_at, factored, spelled_out, .. } = alternative;
+        order.push((number, Route { name, gathered_at, factored, spelled_out, count, cost: count.cost() }));
     }
     order.sort_by_key(|(number, route)| (route.cost, *number));
-    let best = &alternatives[order.first().expect("a route exists").0];
-    let safe = order.iter().map(|(number, _)| &alternatives[*number]).find(|a| a.safe).expect("one route is safe");
+    let best = &alternatives[order.first()?.0];
+    let safe = order.iter().map(|(number, _)| &alternatives[*number]).find(|a| a.safe)?;
     let cautious = g.cautious();
     let nodes = best.nodes.iter().zip(&safe.nodes).map(|(&best, &safe)| g.select(cautious, safe, best)).collect();
-    (nodes, Routes { routine, list: order.into_iter().map(|(_, route)| route).collect() })
+    Some((nodes, Routes { routine, list: order.into_iter().map(|(_, route)| route).collect() }))
 }
 
-/// Returns the first and second derivatives of a scalar by the cheapest route.
+/// Returns the derivatives by the cheapest of several routes, of which the first is safe.
+fn choose(
+    g: &mut Graph,
+    routine: &'static str,
+    values: &[NodeId],
+    alternatives: &[Alternative],
+) -> (Vec<NodeId>, Routes) {
+    cheapest(g, routine, values, alternatives).expect("compiler bug: no route is safe")
+}
+
+/// Steps of the compiler for the routes of a routine that may be given up.
+const STEPS: u64 = 2_000_000;
+
+/// Returns the first and second derivatives of a scalar by the cheapest route. Routes that are tried in a graph of their
+/// own must be shorter by a twentieth: what is not taken must not influence which products are fused, and fewer are not
+/// worth other bits.
 pub fn second_order(
     g: &mut Graph,
     routine: &'static str,
     value: NodeId,
     coordinates: &Coordinates,
 ) -> (SecondOrder, Routes) {
-    let n = coordinates.len();
-    let zero = g.constant(0.0);
-    let dense = |entries: BTreeMap<usize, NodeId>| {
-        let mut hessian = vec![zero; n * (n + 1) / 2];
-        for (place, entry) in entries {
-            hessian[symmetric_index(n, place / n, place % n)] = entry;
+    let before = g.clone();
+    let is_rational = has_rational(g, &[value]);
+    g.spell_out(is_rational);
+    let alternatives = second_derivatives(g, value, coordinates);
+    let (mut nodes, mut routes) = choose(g, routine, &[value], &alternatives);
+    g.spell_out(false);
+    let spellings = if is_rational { &[false, true][..] } else { &[false] };
+    for &spelled_out in spellings {
+        let mut other = before.clone();
+        let attempt = || {
+            other.spell_out(spelled_out);
+            let mut alternatives = factored_derivatives(&mut other, value, coordinates);
+            if is_rational && !spelled_out {
+                alternatives.extend(second_derivatives(&mut other, value, coordinates));
+            }
+            cheapest(&mut other, routine, &[value], &alternatives)
+        };
+        let Some((Some((others, found)), [steps, bytes])) = before.budget().attempt(STEPS, attempt) else { continue };
+        let is_taken = 20 * found.list[0].cost < 19 * routes.list[0].cost;
+        let taken = if is_taken { found.list[0] } else { routes.list[0] };
+        if is_taken {
+            other.spell_out(false);
+            (*g, nodes) = (other, others);
+            g.budget().spend(steps, bytes);
         }
-        hessian
-    };
+        routes.list.extend(found.list);
+        routes.list.sort_by_key(|route| (*route != taken, route.cost));
+    }
+    let hessian = nodes.split_off(coordinates.len());
+    (SecondOrder { value, gradient: nodes, hessian }, routes)
+}
+
+/// Returns whether the outputs depend on rational primitives.
+fn has_rational(g: &Graph, outputs: &[NodeId]) -> bool {
+    let is_rational = |&node: &NodeId| g.rule(node).is_some_and(|rule| rule.primitive.is_rational());
+    differentiable(g, outputs, Order::Second).iter().any(is_rational)
+}
+
+/// Returns the routes with the derivatives of rational primitives, and those through their values.
+fn in_both_spellings(
+    g: &mut Graph,
+    outputs: &[NodeId],
+    routes: impl Fn(&mut Graph) -> Vec<Alternative>,
+) -> Vec<Alternative> {
+    let is_rational = has_rational(g, outputs);
+    let mut alternatives = routes(g);
+    if is_rational {
+        g.spell_out(true);
+        alternatives.extend(routes(g));
+        g.spell_out(false);
+    }
+    alternatives
+}
+
+/// Returns ∇U and the upper triangle of ∇²U, row by row.
+fn dense(g: &mut Graph, n: usize, gradient: &[NodeId], entries: BTreeMap<usize, NodeId>) -> Vec<NodeId> {
+    let mut hessian = vec![g.constant(0.0); n * (n + 1) / 2];
+    for (place, entry) in entries {
+        hessian[symmetric_index(n, place / n, place % n)] = entry;
+    }
+    [gradient, &hessian].concat()
+}
+
+/// Returns the routes to the first and second derivatives of a scalar.
+fn second_derivatives(g: &mut Graph, value: NodeId, coordinates: &Coordinates) -> Vec<Alternative> {
+    let n = coordinates.len();
     let whole = adjoint::alone(g, value);
     let safe = [Order::First, Order::Second].into_iter().all(|order| adjoint::is_safe(g, &[value], order, true));
     let gradients = gradients(g, value, coordinates);
-    let forward_hessian = dense(forward::second_derivatives(g, value, coordinates));
+    let entries = forward::second_derivatives(g, value, coordinates);
     let mut alternatives = Vec::new();
-    let mut offer = |name, gradient: &[NodeId], hessian: &[NodeId], safe| {
-        alternatives.push(Alternative { name, gathered_at: None, nodes: [gradient, hessian].concat(), safe });
+    let mut offer = |g: &mut Graph, name, gradient: &[NodeId], entries: &BTreeMap<usize, NodeId>, safe| {
+        let nodes = dense(g, n, gradient, entries.clone());
+        alternatives.push(Alternative::new(g, name, nodes, safe));
     };
-    offer("forward over forward", &gradients.forward, &forward_hessian, true);
+    offer(g, "forward over forward", &gradients.forward, &entries, true);
     if let Some(gradient) = &gradients.reverse {
-        offer("forward over forward, reverse gradient", gradient, &forward_hessian, safe);
+        offer(g, "forward over forward, reverse gradient", gradient, &entries, safe);
     }
-    if let Some(entries) = adjoint::second_derivatives(g, &whole, coordinates) {
-        let hessian = dense(entries);
-        offer("adjoint-weighted, forward gradient", &gradients.forward, &hessian, safe);
+    if let Some(sums) = adjoint::second_derivatives(g, &whole, coordinates, AsTheyCome::new(n)) {
+        let entries = sums.entries(g);
+        offer(g, "adjoint-weighted, forward gradient", &gradients.forward, &entries, safe);
         if let Some(gradient) = &gradients.reverse {
-            offer("adjoint-weighted, reverse gradient", gradient, &hessian, safe);
+            offer(g, "adjoint-weighted, reverse gradient", gradient, &entries, safe);
         }
     }
+    alternatives.extend(gathered(g, value, coordinates, gradients.apart.as_ref(), || AsTheyCome::new(n)));
+    alternatives
+}
+
+/// Returns the routes on which common factors are taken out of sums of products.
+fn factored_derivatives(g: &mut Graph, value: NodeId, coordinates: &Coordinates) -> Vec<Alternative> {
+    let (n, of_formula) = (coordinates.len(), g.last());
+    let apart = is_computed_otherwise(g, value).then(|| gradients(g, value, coordinates).apart).flatten();
+    let list = gathered(g, value, coordinates, apart.as_ref(), || Factored::new(n, of_formula));
+    let mut alternatives: Vec<_> = list.into_iter().map(|route| Alternative { factored: true, ..route }).collect();
+    if !alternatives.is_empty() && !alternatives.iter().any(|route| route.safe) {
+        let gradient = forward::first_derivatives(g, &[value], coordinates, Order::First).remove(0);
+        let entries = forward::second_derivatives(g, value, coordinates);
+        let nodes = dense(g, n, &gradient, entries);
+        alternatives.push(Alternative::new(g, "forward over forward", nodes, true));
+    }
+    alternatives
+}
+
+/// Returns the routes on which derivatives are gathered at cuts, with this gradient if it is that of other nodes.
+fn gathered<S: Summation>(
+    g: &mut Graph,
+    value: NodeId,
+    coordinates: &Coordinates,
+    apart: Option<&(Vec<NodeId>, bool)>,
+    sums: impl Fn() -> S,
+) -> Vec<Alternative> {
     let primitives = cut::primitives(g, value, coordinates).map(|cut| ("gathered at primitives", cut));
     let waists = cut::waists(g, value, coordinates, Order::Second).into_iter();
     let waists = waists.map(|cut| ("gathered at a waist", cut));
     let mut by_cut = cut::ByCut::new(g);
+    let mut alternatives = Vec::new();
     for (name, cut) in primitives.into_iter().chain(waists) {
         if !by_cut.goes_on(g) {
             break;
         }
-        let Some(found) = cut::derivatives(g, value, &cut, coordinates, &mut by_cut) else { continue };
-        let (gradient, is_safe) = match &gradients.apart {
+        let Some(found) = cut::derivatives(g, value, &cut, coordinates, &mut by_cut, sums()) else { continue };
+        let (gradient, is_safe) = match apart {
             Some((gradient, is_safe)) => (gradient, *is_safe),
             None => (&found.gradient, true),
         };
-        let nodes = [&gradient[..], &dense(found.hessian)].concat();
-        let (gathered_at, safe) = (Some(cut.len()), found.safe && is_safe);
-        alternatives.push(Alternative { name, gathered_at, nodes, safe });
+        let nodes = dense(g, coordinates.len(), gradient, found.hessian);
+        let route = Alternative::new(g, name, nodes, found.safe && is_safe);
+        alternatives.push(Alternative { gathered_at: Some(cut.len()), ..route });
     }
-    let (mut gradient, routes) = choose(g, routine, &[value], &alternatives);
-    let hessian = gradient.split_off(n);
-    (SecondOrder { value, gradient, hessian }, routes)
+    alternatives
 }
 
 /// The first derivatives that go with second ones.
@@ -183,11 +296,12 @@ pub fn hessian_vector(
         })
         .collect();
     // On the general path the product does what ∇²U does.
-    let mut alternatives = vec![Alternative { name: "from the Hessian", gathered_at: None, nodes: formed, safe: true }];
-    let safe = adjoint::is_safe(g, &[energy.value], Order::Second, true);
-    if let Some(nodes) = adjoint::hessian_vector(g, energy.value, coordinates, &rates) {
-        alternatives.push(Alternative { name: "second-order reverse", gathered_at: None, nodes, safe });
-    }
+    let mut alternatives = vec![Alternative::new(g, "from the Hessian", formed, true)];
+    alternatives.extend(in_both_spellings(g, &[energy.value], |g| {
+        let safe = adjoint::is_safe(g, &[energy.value], Order::Second, true);
+        let nodes = adjoint::hessian_vector(g, energy.value, coordinates, &rates);
+        nodes.map(|nodes| Alternative::new(g, "second-order reverse", nodes, safe)).into_iter().collect()
+    }));
     choose(g, routine, &[], &alternatives)
 }
 
@@ -199,8 +313,20 @@ pub fn first_order(
     coordinates: &Coordinates,
     known: Option<Vec<NodeId>>,
 ) -> (Vec<Vec<NodeId>>, Routes) {
+    let mut alternatives = in_both_spellings(g, outputs, |g| first_derivatives(g, outputs, coordinates));
+    if let Some(nodes) = known {
+        // The known derivatives handle the general path themselves.
+        alternatives.push(Alternative::new(g, "as with second derivatives", nodes, true));
+    }
+    let (nodes, routes) = choose(g, routine, outputs, &alternatives);
+    let n = coordinates.len();
+    ((0..outputs.len()).map(|row| nodes[row * n..(row + 1) * n].to_vec()).collect(), routes)
+}
+
+/// Returns the routes to the first derivatives of each output.
+fn first_derivatives(g: &mut Graph, outputs: &[NodeId], coordinates: &Coordinates) -> Vec<Alternative> {
     let forward = forward::first_derivatives(g, outputs, coordinates, Order::First).concat();
-    let mut alternatives = vec![Alternative { name: "forward", gathered_at: None, nodes: forward, safe: true }];
+    let mut alternatives = vec![Alternative::new(g, "forward", forward, true)];
     let safe = adjoint::is_safe(g, outputs, Order::First, true);
     let reverse: Option<Vec<_>> = outputs
         .iter()
@@ -210,13 +336,7 @@ pub fn first_order(
         })
         .collect();
     if let Some(rows) = reverse {
-        alternatives.push(Alternative { name: "reverse", gathered_at: None, nodes: rows.concat(), safe });
+        alternatives.push(Alternative::new(g, "reverse", rows.concat(), safe));
     }
-    if let Some(nodes) = known {
-        // The known derivatives handle the general path themselves.
-        alternatives.push(Alternative { name: "as with second derivatives", gathered_at: None, nodes, safe: true });
-    }
-    let (nodes, routes) = choose(g, routine, outputs, &alternatives);
-    let n = coordinates.len();
-    ((0..outputs.len()).map(|row| nodes[row * n..(row + 1) * n].to_vec()).collect(), routes)
+    alternatives
 }

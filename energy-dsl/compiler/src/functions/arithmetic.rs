@@ -207,6 +207,9 @@ fn mul(g: &mut Graph, args: &[Lowered]) -> Lowered {
                 let column = |j: usize| (0..inner).map(|i| b.at(i, j)).collect();
                 g.note_origin(&parts, Origin::Gram { columns: (0..columns).map(column).collect() });
             }
+            if rows == columns && rows == inner && !b.parts.iter().any(|&part| g.varies(part)) {
+                g.note_origin(&parts, Origin::Deformed { moving: a.parts.clone(), constant: b.parts.clone() });
+            }
             match b.shape {
                 Shape::Vector(_) if rows == 1 => Lowered::scalar(parts[0]),
                 Shape::Vector(_) => Lowered::vector(parts),

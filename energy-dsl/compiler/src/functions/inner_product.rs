@@ -10,6 +10,23 @@ pub(super) fn inner_product(g: &mut Graph, x: &[NodeId], y: &[NodeId]) -> NodeId
     if let Some(quotient) = quotient(g, x, y) {
         return quotient;
     }
+    let [a, b] = [x, y].map(|entries| entries.iter().map(|&entry| g.as_computed(entry)).collect::<Vec<_>>());
+    let product = undivided(g, x, y);
+    match quotient(g, &a, &b) {
+        Some(quotient) => computed_by_quotient(g, product, quotient),
+        None => product,
+    }
+}
+
+/// Creates a product that is computed as an equal quotient. Derivatives are those of either, whichever are shorter.
+fn computed_by_quotient(g: &mut Graph, product: NodeId, quotient: NodeId) -> NodeId {
+    let (one, primitive) = (g.constant(1.0), Primitive::Quotient);
+    let rule = Rule::factored(primitive, vec![product], quotient, vec![vec![one]], vec![Vec::new()]);
+    g.add_rule(rule, &[])
+}
+
+/// Creates Σ xᵢ yᵢ as it is.
+fn undivided(g: &mut Graph, x: &[NodeId], y: &[NodeId]) -> NodeId {
     let value = g.dot(x, y);
     let square = x == y;
     // Shared arguments would have to be summed, so such products follow the ordinary rules.
@@ -57,6 +74,11 @@ fn quotient(g: &mut Graph, x: &[NodeId], y: &[NodeId]) -> Option<NodeId> {
 fn over_common_divisor(g: &Graph, x: &[NodeId]) -> Option<(Vec<NodeId>, NodeId)> {
     let split = |&part: &NodeId| match g.op(part) {
         Op::Div(dividend, divisor) => Some((dividend, divisor)),
+        // An entry of an inverse is a cofactor times the reciprocal of the determinant.
+        Op::Mul(a, b) => [(a, b), (b, a)].into_iter().find_map(|(dividend, reciprocal)| match g.op(reciprocal) {
+            Op::Div(one, divisor) if g.is(one, 1.0) => Some((dividend, divisor)),
+            _ => None,
+        }),
         _ => None,
     };
     let (_, common) = x.first().and_then(split).filter(|&(_, divisor)| x.len() > 1 && g.varies(divisor))?;

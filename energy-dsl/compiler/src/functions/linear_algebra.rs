@@ -3,6 +3,7 @@
 use super::angle::recognise_cosine;
 use super::arithmetic::scaled;
 use super::inner_product::inner_product;
+use super::inverse;
 use super::polar::recognise_stretch_trace;
 use super::quaternion::inverse_motion;
 use super::rotated::recognise_rotated_product;
@@ -413,8 +414,16 @@ fn inverse(g: &mut Graph, a: &[Lowered]) -> Lowered {
     let n = a[0].dimensions().0;
     let cofactors = cofactors(g, &a[0]);
     let determinant = determinant(g, &a[0], &cofactors);
-    let parts = (0..n * n).map(|e| g.div(cofactors[(e % n) * n + e / n], determinant)).collect();
-    Lowered::matrix(n, n, parts)
+    let cofactor = |e: usize| cofactors[(e % n) * n + e / n];
+    let entries = if inverse::has_primitives(g, &a[0].parts) {
+        let one = g.constant(1.0);
+        let reciprocal = g.div(one, determinant);
+        let entries = (0..n * n).map(|e| g.mul(cofactor(e), reciprocal)).collect();
+        inverse::primitives(g, &a[0].parts, entries)
+    } else {
+        (0..n * n).map(|e| g.div(cofactor(e), determinant)).collect()
+    };
+    Lowered::matrix(n, n, entries)
 }
 
 fn adjugate(g: &mut Graph, a: &[Lowered]) -> Lowered {

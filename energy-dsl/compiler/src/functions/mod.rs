@@ -1,6 +1,5 @@
 //! The functions of the language, one row each: name, description, shape rule, effect on units, lowering and
-//! accuracy. Operators are
-//! functions, too. The derivatives of a robust primitive are next to its lowering.
+//! accuracy. Operators are functions, too. The derivatives of a robust primitive are next to its lowering.
 
 mod angle;
 mod arithmetic;
@@ -12,6 +11,7 @@ mod error_function;
 mod exponential;
 mod hyperbolic;
 mod inner_product;
+mod inverse;
 mod length;
 mod lengths;
 mod linear_algebra;

@@ -225,6 +225,11 @@ impl Graph {
         self.signed(product, minus_a != minus_b)
     }
 
+    /// Returns whether the product of two factors without signs is a node already.
+    pub(crate) fn has_product(&self, a: NodeId, b: NodeId) -> bool {
+        self.index.contains_key(&Op::Mul(a.min(b), a.max(b)))
+    }
+
     /// Creates a · b; a minus sign stays with its factor.
     pub(super) fn signed_product(&mut self, a: NodeId, b: NodeId) -> NodeId {
         self.node(Op::Mul(a.min(b), a.max(b)))

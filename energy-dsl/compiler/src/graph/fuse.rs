@@ -97,7 +97,7 @@ impl Graph {
     }
 
     /// Returns whether a node is a power of two that scales.
-    pub(super) fn is_scale(&self, node: NodeId) -> bool {
+    pub(crate) fn is_scale(&self, node: NodeId) -> bool {
         match self.op(node) {
             Op::PowerOfTwoScale(_) => true,
             Op::Mul(a, b) => self.is_scale(a) && self.is_scale(b),

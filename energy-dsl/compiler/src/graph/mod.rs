@@ -79,6 +79,8 @@ pub struct Graph {
     compensated: bool,
     /// Parameters that the formula differentiates by.
     varied: BTreeSet<Input>,
+    /// Whether rational primitives are differentiated through their values.
+    spelled_out: bool,
     /// Pays for nodes and for passes over them.
     budget: Budget,
 }
@@ -116,6 +118,7 @@ impl Graph {
             outward: false,
             compensated: true,
             varied: BTreeSet::new(),
+            spelled_out: false,
             budget: Budget::new(Limits::NONE),
         }
     }
@@ -144,6 +147,31 @@ impl Graph {
     /// Sets whether powers of two move out of products and sums.
     pub fn move_outward(&mut self, outward: bool) {
         self.outward = outward;
+    }
+
+    /// Sets whether rational primitives are differentiated through their values, as if they were spelled out.
+    pub(crate) fn spell_out(&mut self, spelled_out: bool) {
+        self.spelled_out = spelled_out;
+    }
+
+    /// Returns whether rational primitives are spelled out.
+    pub(crate) fn spells_out(&self) -> bool {
+        self.spelled_out
+    }
+
+    /// Returns whether a rule is a rational primitive that is spelled out.
+    pub(crate) fn is_spelled_out(&self, rule: &Rule) -> bool {
+        self.spelled_out && rule.primitive.is_rational()
+    }
+
+    /// Returns the value of a rational primitive; other nodes as they are.
+    pub(crate) fn as_computed(&self, node: NodeId) -> NodeId {
+        self.rule(node).filter(|rule| rule.primitive.is_rational()).map_or(node, |rule| rule.value)
+    }
+
+    /// Returns the last node that was created.
+    pub(crate) fn last(&self) -> NodeId {
+        NodeId(u32::try_from(self.len().saturating_sub(1)).expect("fewer than 2³² nodes"))
     }
 
     /// Returns the form that functions are lowered to.
@@ -179,6 +207,23 @@ impl Graph {
     #[must_use]
     pub fn varies(&self, node: NodeId) -> bool {
         self.varies[node.0 as usize]
+    }
+
+    /// Returns whether all nodes are linear functions of what varies.
+    pub(crate) fn are_linear(&self, nodes: &[NodeId]) -> bool {
+        let mut stack = nodes.to_vec();
+        while let Some(node) = stack.pop() {
+            match self.op(node) {
+                _ if !self.varies(node) => {}
+                Op::Input(_) => {}
+                Op::Neg(a) => stack.push(a),
+                Op::Add(a, b) | Op::Sub(a, b) => stack.extend([a, b]),
+                Op::Mul(a, b) if !(self.varies(a) && self.varies(b)) => stack.extend([a, b]),
+                Op::Div(a, b) if !self.varies(b) => stack.push(a),
+                _ => return false,
+            }
+        }
+        true
     }
 
     /// Returns the rule of a node; `None` if it is not a robust primitive.

@@ -21,6 +21,8 @@ pub(crate) enum Origin {
     Unrotated { matrix: Vec<NodeId> },
     /// S − I of F = R S, with the trace of S.
     Strain { trace: NodeId, matrix: Vec<NodeId> },
+    /// The product of a square matrix that moves and one that does not.
+    Deformed { moving: Vec<NodeId>, constant: Vec<NodeId> },
     /// FᵀF of a matrix F with these columns.
     Gram { columns: Vec<Vec<NodeId>> },
     /// The exponential of a twist (θ, t), with cos ‖θ‖ and sin ‖θ‖/‖θ‖.

@@ -95,6 +95,10 @@ pub enum Primitive {
     Spectral,
     /// A cubic spline through the numbers of a table.
     Spline,
+    /// An entry of F⁻¹.
+    Inverse(u8),
+    /// A product with entries of F⁻¹, computed as one quotient.
+    Quotient,
     /// A component of the quaternion exp(δ) q at δ = 0.
     Turned(u8),
     /// A component of a vector that such a quaternion turns.
@@ -124,6 +128,12 @@ impl Primitive {
     #[must_use]
     pub const fn saturates(self) -> bool {
         matches!(self, Self::ArcTangent | Self::HyperbolicTangent | Self::ErrorFunction | Self::Softplus | Self::Expm1)
+    }
+
+    /// Returns whether its value may be differentiated in its place. Which is shorter depends on the formula.
+    #[must_use]
+    pub(crate) const fn is_rational(self) -> bool {
+        matches!(self, Self::Inverse(_) | Self::Quotient)
     }
 
     /// Returns its name in the documentation of generated code; `None` if it is internal.
@@ -173,6 +183,8 @@ impl Primitive {
             Self::SingularValue(_) | Self::Spectral => "functions of singular values",
             Self::Spline => "cubic spline",
             Self::InnerProduct
+            | Self::Inverse(_)
+            | Self::Quotient
             | Self::Partial { .. }
             | Self::SincSqrtSlope
             | Self::ComputedAs { .. }

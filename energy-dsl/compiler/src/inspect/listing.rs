@@ -171,16 +171,19 @@ impl Listing {
         let mut text = String::new();
         for routes in &self.routines.routes {
             writeln!(text, "{} {}", self.name, routes.routine).expect("writing to a string succeeds");
-            let best = routes.list.first().map_or(0, |route| route.cost);
+            let taken = routes.list.first().map_or(0, |route| route.cost);
+            let least = routes.list.iter().map(|route| route.cost).min().unwrap_or(0);
+            let width = routes.list.iter().map(|route| name_of(route).chars().count()).max().unwrap_or(0);
             for (place, route) in routes.list.iter().enumerate() {
                 let why = match place {
-                    0 => "taken: costs least".to_owned(),
-                    _ if route.cost == best => "as cheap, but listed later".to_owned(),
-                    _ => format!("costs {:.2}×", route.cost as f64 / best as f64),
+                    0 if taken == least => "taken: costs least".to_owned(),
+                    0 => "taken: less by a twentieth would change it".to_owned(),
+                    _ if route.cost == taken => "as cheap, but listed later".to_owned(),
+                    _ => format!("costs {:.2}×", route.cost as f64 / taken as f64),
                 };
                 writeln!(
                     text,
-                    "  {:<42} cost {:>5}, {:>4} operations ({} fused, {} divisions and roots, {} transcendental, {} \
+                    "  {:<width$} cost {:>5}, {:>4} operations ({} fused, {} divisions and roots, {} transcendental, {} \
                      error terms)  {why}",
                     name_of(route),
                     route.cost,
@@ -212,11 +215,18 @@ impl Listing {
 
 /// Returns the name of a route, and how many numbers its derivatives are gathered at.
 fn name_of(route: &Route) -> String {
-    match route.gathered_at {
+    let mut name = match route.gathered_at {
         None => route.name.to_owned(),
         Some(1) => format!("{} (1 number)", route.name),
         Some(count) => format!("{} ({count} numbers)", route.name),
+    };
+    if route.factored {
+        name += ", factored";
     }
+    if route.spelled_out {
+        name += ", inverses spelled out";
+    }
+    name
 }
 
 /// Writes the code of a declaration to `folder/name.rs`.

@@ -11,10 +11,10 @@ use crate::graph::{Contraction, Graph, NodeId, upper};
 pub(super) fn of_rotation(at: &Decomposition, arguments: &[NodeId], values: Vec<NodeId>) -> Contraction {
     let matrices = [at.rotation, at.consistent, at.inverse].into_iter().flatten().flatten();
     let factors = matrices.chain(at.turns.iter().copied().flatten()).chain([at.scale]).collect();
-    Contraction { values, arguments: arguments.to_vec(), factors, second }
+    Contraction { values, arguments: arguments.to_vec(), factors, first: None, second }
 }
 
-fn second(g: &mut Graph, factors: &[NodeId], weights: &[NodeId]) -> Vec<NodeId> {
+fn second(g: &mut Graph, factors: &[NodeId], weights: &[NodeId]) -> Vec<Vec<NodeId>> {
     let [r, s, inverse] = [0, 9, 18].map(|first| rows(&factors[first..first + 9]));
     let turns: Vec<Vector> = factors[27..54].chunks_exact(3).map(|turn| [turn[0], turn[1], turn[2]]).collect();
     let square_of_scale = g.mul(factors[54], factors[54]);
@@ -40,7 +40,7 @@ fn second(g: &mut Graph, factors: &[NodeId], weights: &[NodeId]) -> Vec<NodeId> 
     upper(9)
         .map(|(x, y)| {
             let (first, second) = (g.dot(&turns[x], &bent[y]), g.dot(&levers[x], &turns[y]));
-            g.add(first, second)
+            vec![g.add(first, second)]
         })
         .collect()
 }
