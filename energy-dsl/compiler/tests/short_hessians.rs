@@ -3,7 +3,7 @@
 use energy_compiler::Listing;
 
 /// A formula, and the most operations of its reduced Hessian.
-const FORMULAS: [(&str, usize); 15] = [
+const FORMULAS: [(&str, usize); 17] = [
     // With s = ‖d‖², ∇²U = 2 f′ I + 4 f″ d dᵀ: 6 for s, 8 for f, 12 for f′ and f″, 6 for each product, 9 for ∇U.
     ("energy LennardJones(p, q: Point; k, s: Scalar) { let r = s^2 / norm_squared(p - q); 4 * k * (r^6 - r^3) }", 70),
     // f of a length: its derivatives are scalars.
@@ -82,20 +82,34 @@ const FORMULAS: [(&str, usize); 15] = [
       }",
         320,
     ),
-    // One quotient instead of nine.
+    // With δG = −G δF G and M = 2 GᵀG Gᵀ, each entry of ∇²U is (GᵀG)(GGᵀ) + G M + M G: three products. 42 operations
+    // for G, 30 for each of GᵀG and GGᵀ, 45 for M, 5 for each of 45 entries.
     (
         "energy Inverse(x0, x1, x2, x3: Point) {
         let G = inverse(columns(x1 - x0, x2 - x0, x3 - x0)); ddot(G, G)
       }",
-        660,
+        530,
     ),
-    // Narrower parts than the nine coordinates, one above the other.
+    (
+        "energy InverseGap(x0, x1, x2, x3: Point; A: Mat3x3) {
+        let G = inverse(columns(x1 - x0, x2 - x0, x3 - x0)) - A; ddot(G, G)
+      }",
+        600,
+    ),
+    (
+        "energy Opposite(x0, x1, x2, x3: Point; rest X0, X1, X2, X3: Point; μ: Scalar) {
+        rest { let B = inverse(columns(X1 - X0, X2 - X0, X3 - X0)); }
+        let F = columns(x1 - x0, x2 - x0, x3 - x0) * B; let E = F - transpose(inverse(F)); μ * ddot(E, E)
+      }",
+        1040,
+    ),
+    // The same with F = D R and Z = R G: δG = −G δD Z. 45 operations more for each of F, Z, F Rᵀ, 30 for R Rᵀ.
     (
         "energy SymmetricDirichlet(x0, x1, x2, x3: Point; rest X0, X1, X2, X3: Point; μ: Scalar) {
         rest { let B = inverse(columns(X1 - X0, X2 - X0, X3 - X0)); }
         let F = columns(x1 - x0, x2 - x0, x3 - x0) * B; let G = inverse(F); μ * (ddot(F, F) + ddot(G, G))
       }",
-        1330,
+        650,
     ),
     // ‖F − R‖² and tr S have closed second derivatives, however they are spelled.
     (
@@ -104,7 +118,7 @@ const FORMULAS: [(&str, usize); 15] = [
         let F = columns(x1 - x0, x2 - x0, x3 - x0) * B; let R = rotation_of(F);
         μ * ddot(F - R, F - R) + λ / 2 * (trace(transpose(R) * F) - 3)^2
       }",
-        2300,
+        2000,
     ),
     (
         "energy CorotatedStrain(x0, x1, x2, x3: Point; rest X0, X1, X2, X3: Point; μ, λ: Scalar) {
@@ -112,7 +126,7 @@ const FORMULAS: [(&str, usize); 15] = [
         let F = columns(x1 - x0, x2 - x0, x3 - x0) * B;
         let E = transpose(rotation_of(F)) * F - identity(3); μ * ddot(E, E) + λ / 2 * trace(E)^2
       }",
-        2300,
+        2000,
     ),
     // Entries of R are weighted before they are differentiated: 45 sums instead of 9 times 45.
     (

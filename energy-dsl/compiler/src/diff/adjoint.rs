@@ -7,7 +7,7 @@ use super::forward::{Sparse, tangents, tangents_by};
 use super::local::{Order, local};
 use super::outer_products::Summation;
 use super::{accumulate, differentiable};
-use crate::graph::{Graph, NodeId, Op, upper};
+use crate::graph::{Graph, NodeId, Op};
 
 /// Nodes and their weights.
 pub(super) type Weighted = BTreeMap<NodeId, NodeId>;
@@ -101,11 +101,9 @@ pub(super) fn second_derivatives<S: Summation>(
     for contraction in &contractions {
         let weights = contraction.weights(g, |value| adjoints.get(&value).copied());
         let entries = (contraction.second)(g, &contraction.factors, &weights);
+        let of: Vec<&Sparse> = contraction.arguments.iter().map(|of| tangents.get(of).unwrap_or(&none)).collect();
         sums.next();
-        for ((i, j), entry) in upper(contraction.arguments.len()).zip(entries) {
-            let [a, b] = [i, j].map(|k| tangents.get(&contraction.arguments[k]).unwrap_or(&none));
-            sums.add(g, &entry, (a, b), i == j);
-        }
+        sums.add_form(g, &entries, &of);
     }
     for node in nodes {
         let is_contracted = contractions.iter().any(|contraction| contraction.values.contains(&node));
@@ -119,7 +117,7 @@ pub(super) fn second_derivatives<S: Summation>(
             let a = tangents.get(&local.operands[i]).unwrap_or(&none);
             let b = tangents.get(&local.operands[j]).unwrap_or(&none);
             let weight = g.sum_of_products(Some(weight), &products_of);
-            sums.add(g, &[weight], (a, b), i == j);
+            sums.add(g, weight, (a, b), i == j);
         }
     }
     Some(sums)

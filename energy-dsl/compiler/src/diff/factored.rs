@@ -5,13 +5,24 @@ use std::collections::BTreeMap;
 
 use super::forward::Sparse;
 use super::outer_products::Summation;
-use crate::graph::{Graph, NodeId, Op};
+use crate::graph::{Graph, NodeId, Op, Product};
+
+/// Where a factor of an entry of a xᵀ w y comes from. A number in both x and y is two factors: if it were taken out as
+/// one, what remains would be no product of sums.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+enum Side {
+    Weight,
+    Left,
+    Right,
+}
+
+type Factor = (NodeId, Side);
 
 /// A product: a constant, and other factors in ascending order.
 #[derive(Clone, Debug, PartialEq)]
 struct Term {
     constant: f64,
-    factors: Vec<NodeId>,
+    factors: Vec<Factor>,
 }
 
 /// The most products of a sum that is factored.
@@ -19,10 +30,10 @@ const MOST: usize = 64;
 
 impl Term {
     /// Takes apart the product of some nodes, but not those up to the last one `of_formula`.
-    fn of(g: &Graph, of_formula: NodeId, nodes: &[NodeId]) -> Self {
+    fn of(g: &Graph, of_formula: NodeId, factors: &[Factor]) -> Self {
         let mut term = Self { constant: 1.0, factors: Vec::new() };
-        let mut stack = nodes.to_vec();
-        while let Some(node) = stack.pop() {
+        let mut stack = factors.to_vec();
+        while let Some((node, side)) = stack.pop() {
             if let Some(constant) = g.as_constant(node) {
                 term.constant *= constant;
                 continue;
@@ -30,31 +41,33 @@ impl Term {
             match g.op(node) {
                 Op::Neg(a) => {
                     term.constant = -term.constant;
-                    stack.push(a);
+                    stack.push((a, side));
                 }
-                Op::Mul(a, b) if node > of_formula && !g.is_scale(a) && !g.is_scale(b) => stack.extend([a, b]),
-                _ => term.factors.push(g.as_computed(node)),
+                Op::Mul(a, b) if node > of_formula && !g.is_scale(a) && !g.is_scale(b) => {
+                    stack.extend([(a, side), (b, side)]);
+                }
+                _ => term.factors.push((g.as_computed(node), side)),
             }
         }
         term.factors.sort_unstable();
         term
     }
 
-    fn has(&self, factors: &[NodeId]) -> bool {
+    fn has(&self, factors: &[Factor]) -> bool {
         match factors {
             [a, b] if a == b => self.factors.windows(2).any(|pair| pair == factors),
             _ => factors.iter().all(|factor| self.factors.binary_search(factor).is_ok()),
         }
     }
 
-    fn without(mut self, factor: NodeId) -> Self {
+    fn without(mut self, factor: Factor) -> Self {
         if let Ok(place) = self.factors.binary_search(&factor) {
             self.factors.remove(place);
         }
         self
     }
 
-    fn times(mut self, factor: NodeId) -> Self {
+    fn times(mut self, factor: Factor) -> Self {
         let place = self.factors.partition_point(|&other| other < factor);
         self.factors.insert(place, factor);
         self
@@ -64,7 +77,8 @@ impl Term {
         let sign = g.constant(self.constant.signum());
         let scale = (self.constant.abs() != 1.0).then(|| g.constant(self.constant.abs()));
         // Factors of the formula come first: several sums share them.
-        let mut factors: Vec<NodeId> = scale.into_iter().chain(self.factors).collect();
+        let mut factors: Vec<NodeId> =
+            scale.into_iter().chain(self.factors.into_iter().map(|(node, _)| node)).collect();
         // Other sums may have formed a part of the product.
         while let Some((i, j)) = known_product(g, &factors) {
             factors[i] = g.mul(factors[i], factors[j]);
@@ -121,17 +135,17 @@ fn factored(g: &mut Graph, of_formula: NodeId, terms: Vec<Term>) -> Term {
         terms.push(common.into_iter().fold(inner, Term::times));
     }
     let sum = added(g, &terms);
-    let sum = Term::of(g, of_formula, &[sum]);
+    let sum = Term::of(g, of_formula, &[(sum, Side::Weight)]);
     let sum = Term { constant: sum.constant * taken.constant, ..sum };
     taken.factors.into_iter().fold(sum, Term::times)
 }
 
 /// Returns the one or two factors that, taken out of all terms that have them, save the most products; the first of
 /// equals, two rather than one. `None` if no terms share any.
-fn most_shared(terms: &[Term]) -> Option<Vec<NodeId>> {
-    let mut counts: BTreeMap<Vec<NodeId>, usize> = BTreeMap::new();
+fn most_shared(terms: &[Term]) -> Option<Vec<Factor>> {
+    let mut counts: BTreeMap<Vec<Factor>, usize> = BTreeMap::new();
     for term in terms {
-        let mut own: Vec<Vec<NodeId>> = Vec::new();
+        let mut own: Vec<Vec<Factor>> = Vec::new();
         for (i, &a) in term.factors.iter().enumerate() {
             own.push(vec![a]);
             own.extend(term.factors[i + 1..].iter().map(|&b| vec![a, b]));
@@ -140,7 +154,7 @@ fn most_shared(terms: &[Term]) -> Option<Vec<NodeId>> {
         own.dedup();
         own.into_iter().for_each(|factors| *counts.entry(factors).or_insert(0) += 1);
     }
-    let saved = |factors: &[NodeId], count: usize| (factors.len() * (count - 1), factors.len());
+    let saved = |factors: &[Factor], count: usize| (factors.len() * (count - 1), factors.len());
     let shared = counts.into_iter().filter(|&(_, count)| count > 1);
     let best = shared.rev().max_by_key(|(factors, count)| saved(factors, *count))?;
     Some(best.0)
@@ -188,7 +202,11 @@ impl Summation for Factored {
         let mut sums: BTreeMap<usize, Vec<Term>> = BTreeMap::new();
         for &(factor, parts) in terms {
             for &(coordinate, part) in parts {
-                sums.entry(coordinate).or_default().push(Term::of(g, self.of_formula, &[factor, part]));
+                sums.entry(coordinate).or_default().push(Term::of(
+                    g,
+                    self.of_formula,
+                    &[(factor, Side::Weight), (part, Side::Weight)],
+                ));
             }
         }
         let sums = sums.into_iter().map(|(coordinate, terms)| (coordinate, sum(g, self.of_formula, terms)));
@@ -200,22 +218,37 @@ impl Summation for Factored {
         self.origin += 1;
     }
 
-    fn add(&mut self, g: &mut Graph, weights: &[NodeId], (a, b): (&Sparse, &Sparse), same: bool) {
-        for (part, &weight) in weights.iter().enumerate() {
-            for (&(i, x), &(j, y)) in a.iter().flat_map(|x| b.iter().map(move |y| (x, y))) {
-                let term = Term::of(g, self.of_formula, &[weight, x, y]);
-                if i <= j {
-                    self.put((i, j), part, term.clone());
+    fn add(&mut self, g: &mut Graph, weight: NodeId, (a, b): (&Sparse, &Sparse), same: bool) {
+        for (&(i, x), &(j, y)) in a.iter().flat_map(|x| b.iter().map(move |y| (x, y))) {
+            let term = Term::of(g, self.of_formula, &[(weight, Side::Weight), (x, Side::Left), (y, Side::Right)]);
+            if i <= j {
+                self.put((i, j), 0, term.clone());
+            }
+            if !same && j <= i {
+                self.put((j, i), 0, term);
+            }
+        }
+    }
+
+    fn add_form(&mut self, g: &mut Graph, form: &[Vec<Product>], of: &[&Sparse]) {
+        let places = (0..of.len()).flat_map(|k| (0..of.len()).map(move |l| (k, l)));
+        for ((k, l), products) in places.zip(form) {
+            for (&(i, x), &(j, y)) in of[k].iter().flat_map(|x| of[l].iter().map(move |y| (x, y))) {
+                if i > j {
+                    continue;
                 }
-                if !same && j <= i {
-                    self.put((j, i), weights.len() - 1 - part, term);
+                for (part, factors) in products.iter().enumerate() {
+                    let weights: Vec<Factor> = factors.iter().map(|&factor| (factor, Side::Weight)).collect();
+                    let term =
+                        Term::of(g, self.of_formula, &[&weights[..], &[(x, Side::Left), (y, Side::Right)]].concat());
+                    self.put((i, j), part, term);
                 }
             }
         }
     }
 
     fn add_to_entry(&mut self, g: &mut Graph, place: (usize, usize), x: NodeId, y: NodeId) {
-        let term = Term::of(g, self.of_formula, &[x, y]);
+        let term = Term::of(g, self.of_formula, &[(x, Side::Left), (y, Side::Right)]);
         self.put(place, 0, term);
     }
 

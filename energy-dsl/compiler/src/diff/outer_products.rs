@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::accumulate;
 use super::forward::{Sparse, combine, products};
-use crate::graph::{Graph, NodeId};
+use crate::graph::{Graph, NodeId, Product, upper};
 
 /// A way to add up sums of products, and the sums of the entries of an upper triangle.
 pub(super) trait Summation {
@@ -14,8 +14,11 @@ pub(super) trait Summation {
     /// Begins the terms of another origin.
     fn next(&mut self);
 
-    /// Adds Σ weights · a aᵀ; or Σ weights · a bᵀ + Σ weights · b aᵀ, where the latter has the weights in reverse order.
-    fn add(&mut self, g: &mut Graph, weights: &[NodeId], of: (&Sparse, &Sparse), same: bool);
+    /// Adds weight · a aᵀ, or weight · (a bᵀ + b aᵀ).
+    fn add(&mut self, g: &mut Graph, weight: NodeId, of: (&Sparse, &Sparse), same: bool);
+
+    /// Adds Σ wᵢⱼ aᵢ aⱼᵀ for a symmetric matrix w, each entry a sum of products.
+    fn add_form(&mut self, g: &mut Graph, form: &[Vec<Product>], of: &[&Sparse]);
 
     /// Adds x · y to an entry.
     fn add_to_entry(&mut self, g: &mut Graph, place: (usize, usize), x: NodeId, y: NodeId);
@@ -44,8 +47,15 @@ impl Summation for AsTheyCome {
 
     fn next(&mut self) {}
 
-    fn add(&mut self, g: &mut Graph, weights: &[NodeId], (a, b): (&Sparse, &Sparse), same: bool) {
-        let weight = g.sum(weights.to_vec());
+    fn add_form(&mut self, g: &mut Graph, form: &[Vec<Product>], of: &[&Sparse]) {
+        for (i, j) in upper(of.len()) {
+            let products: Vec<NodeId> = form[i * of.len() + j].iter().map(|product| g.product(None, product)).collect();
+            let weight = g.sum(products);
+            self.add(g, weight, (of[i], of[j]), i == j);
+        }
+    }
+
+    fn add(&mut self, g: &mut Graph, weight: NodeId, (a, b): (&Sparse, &Sparse), same: bool) {
         // Weights the shorter factor, which takes fewer products.
         let (shorter, longer) = if a.len() <= b.len() { (a, b) } else { (b, a) };
         let weighted: Sparse = shorter.iter().map(|&(c, part)| (c, g.mul(weight, part))).collect();

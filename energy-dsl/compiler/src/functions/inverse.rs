@@ -4,7 +4,7 @@
 //! Weighted sums of them are shorter than each: with M = Bᵀ W Zᵀ, Σ w δB = −M : δD, and the second derivatives are
 //! Z_jk M_il + Z_li M_kj for D_ij and D_kl.
 
-use crate::graph::{Contraction, Form, Graph, NodeId, Op, Origin, Primitive, Rule, upper};
+use crate::graph::{Contraction, Form, Graph, NodeId, Op, Origin, Primitive, Product, Rule, upper};
 
 /// Returns whether the entries of F⁻¹ are primitives. Those of other matrices than 3×3 have short derivatives as they
 /// are. The entries of F must be linear functions: the derivatives of B have its errors, which follow from those of F,
@@ -34,7 +34,16 @@ pub(super) fn primitives(g: &mut Graph, f: &[NodeId], b: Vec<NodeId>) -> Vec<Nod
     };
     let values: Vec<NodeId> = (0..9).map(primitive).collect();
     let factors = [&b[..], &z].concat();
-    g.note_contraction(Contraction { values: values.clone(), arguments, factors, first: Some(first), second });
+    let (family, values_of) = (Primitive::Inverse(0), values.clone());
+    g.note_contraction(Contraction {
+        family,
+        fewest: 2,
+        values: values_of,
+        arguments,
+        factors,
+        first: Some(first),
+        second,
+    });
     values
 }
 
@@ -83,12 +92,12 @@ fn first(g: &mut Graph, factors: &[NodeId], weights: &[NodeId]) -> Vec<NodeId> {
     pulled(g, b, z, weights).into_iter().map(|entry| g.neg(entry)).collect()
 }
 
-fn second(g: &mut Graph, factors: &[NodeId], weights: &[NodeId]) -> Vec<Vec<NodeId>> {
+fn second(g: &mut Graph, factors: &[NodeId], weights: &[NodeId]) -> Vec<Vec<Product>> {
     let (b, z) = factors.split_at(9);
     let m = pulled(g, b, z, weights);
-    let entry = |(x, y)| {
-        let ((i, j), (k, l)) = ((x / 3, x % 3), (y / 3, y % 3));
-        vec![g.mul(z[3 * j + k], m[3 * i + l]), g.mul(z[3 * l + i], m[3 * k + j])]
+    let entry = |xy: usize| {
+        let ((i, j), (k, l)) = ((xy / 27, xy / 9 % 3), (xy / 3 % 3, xy % 3));
+        vec![vec![z[3 * j + k], m[3 * i + l]], vec![z[3 * l + i], m[3 * k + j]]]
     };
-    upper(9).map(entry).collect()
+    (0..81).map(entry).collect()
 }

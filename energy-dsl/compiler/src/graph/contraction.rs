@@ -1,6 +1,6 @@
 //! Weighted sums of the derivatives of several primitives.
 
-use super::{Graph, NodeId};
+use super::{Graph, NodeId, Primitive, Product};
 
 /// The factors of a contraction and the weights of its values; the derivatives of their sum.
 pub(crate) type Contracted<T> = fn(&mut Graph, &[NodeId], &[NodeId]) -> Vec<T>;
@@ -9,6 +9,10 @@ pub(crate) type Contracted<T> = fn(&mut Graph, &[NodeId], &[NodeId]) -> Vec<T>;
 /// takes.
 #[derive(Clone, Debug)]
 pub(crate) struct Contraction {
+    /// The first of the primitives that can be among the values.
+    pub(crate) family: Primitive,
+    /// The fewest values for which it is shorter.
+    pub(crate) fewest: usize,
     /// vᵢ, as rules.
     pub(crate) values: Vec<NodeId>,
     /// The arguments that they share.
@@ -17,9 +21,9 @@ pub(crate) struct Contraction {
     pub(crate) factors: Vec<NodeId>,
     /// Returns Σ wᵢ ∇vᵢ; `None` if that takes no fewer operations than each ∇vᵢ.
     pub(crate) first: Option<Contracted<NodeId>>,
-    /// Returns the upper triangle of Σ wᵢ ∇²vᵢ, row by row. Each entry is a sum; the entry with exchanged arguments has
-    /// the same numbers in reverse order.
-    pub(crate) second: Contracted<Vec<NodeId>>,
+    /// Returns the matrix Σ wᵢ ∇²vᵢ, row by row. Each entry is a sum of as many products. Those at one place are the
+    /// outer product of two vectors, if possible, so that they stay one after linear functions.
+    pub(crate) second: Contracted<Vec<Product>>,
 }
 
 impl Contraction {
@@ -31,17 +35,19 @@ impl Contraction {
 }
 
 impl Graph {
-    /// Records a contraction, unless it is known.
+    /// Records a contraction, in place of a known one of the same primitives.
     pub(crate) fn note_contraction(&mut self, contraction: Contraction) {
-        if !self.contractions.iter().any(|known| known.values == contraction.values) {
-            self.contractions.push(contraction);
-        }
+        let shares = |known: &Contraction| known.values.iter().any(|value| contraction.values.contains(value));
+        self.contractions.retain(|known| known.family != contraction.family || !shares(known));
+        self.contractions.push(contraction);
     }
 
-    /// Returns the contractions of which several primitives are among these nodes.
+    /// Returns the contractions of which enough primitives are among these nodes.
     pub(crate) fn contractions_of(&self, is_used: impl Fn(NodeId) -> bool) -> Vec<Contraction> {
         let is_rule = |&value: &NodeId| self.rule(value).is_some_and(|rule| !self.is_spelled_out(rule));
-        let used = |of: &&Contraction| of.values.iter().filter(|&value| is_used(*value) && is_rule(value)).count() > 1;
+        let used = |of: &&Contraction| {
+            of.values.iter().filter(|&value| is_used(*value) && is_rule(value)).count() >= of.fewest
+        };
         self.contractions.iter().filter(used).cloned().collect()
     }
 }

@@ -296,6 +296,11 @@ impl Graph {
         node
     }
 
+    /// Returns the rule of a primitive with these arguments and no other constants, if there is one.
+    pub(crate) fn known_rule(&self, primitive: Primitive, arguments: &[NodeId]) -> Option<NodeId> {
+        self.rule_index.get(&(primitive, arguments.to_vec())).copied()
+    }
+
     /// Changes a rule that was just added.
     pub(crate) fn change_rule(&mut self, node: NodeId, change: impl FnOnce(&mut Rule)) {
         if let Op::Rule(id) = self.op(node) {

@@ -47,6 +47,7 @@ fn robust(g: &mut Graph, arguments: &[NodeId]) -> Polar {
     let second = upper(9).map(|(x, y)| vec![vec![at.scale, at.turning(g, x, y)]]).collect();
     let rule = Rule::factored(Primitive::StretchTrace, arguments.to_vec(), trace, first, second);
     let trace = g.add_rule(rule.without_limit(1, at.degenerate), &[]);
+    at.note_stretch(g, arguments);
     Polar { rotation: rules, trace }
 }
 
@@ -60,7 +61,10 @@ pub(super) fn recognise_stretch_difference(g: &mut Graph, trace: NodeId, three: 
     let strain = at.strain(g, &rule.arguments);
     let (near, far) = (self::trace(g, &strain.matrix), g.plain_difference(rule.value, three));
     let value = g.select(strain.small, near, far);
-    Some(g.add_rule(Rule { primitive: Primitive::StretchTraceExcess, value, ..rule }, &[]))
+    let arguments = rule.arguments.clone();
+    let excess = g.add_rule(Rule { primitive: Primitive::StretchTraceExcess, value, ..rule }, &[]);
+    at.note_stretch(g, &arguments);
+    Some(excess)
 }
 
 /// Returns ‖F − R‖² = ‖E‖² with E = S − I. Its gradient is 2 (F − R) = 2 R E, its Hessian twice that of ½ ‖F‖² − tr S.
@@ -89,7 +93,9 @@ pub(super) fn distance_to_rotation(g: &mut Graph, arguments: &[NodeId]) -> NodeI
         })
         .collect();
     let rule = Rule::factored(Primitive::DistanceToRotation, arguments.to_vec(), value, first, second);
-    g.add_rule(rule.without_limit(1, at.degenerate), &[])
+    let distance = g.add_rule(rule.without_limit(1, at.degenerate), &[]);
+    at.note_stretch(g, arguments);
+    distance
 }
 
 /// R, S, K⁻¹ and T of a matrix. S and K⁻¹ are those of the same matrix close to F: in second derivatives, their errors
@@ -153,6 +159,14 @@ impl Decomposition {
     /// Returns a(X)·K⁻¹ a(Y): the rate of entry X of R with Y, and the Hessian of tr S.
     fn turning(&self, g: &mut Graph, x: usize, y: usize) -> NodeId {
         g.dot(&self.spins[x], &self.turns[y])
+    }
+
+    /// Notes the contraction of the functions of S that are known. It has none if nothing moves.
+    fn note_stretch(&self, g: &mut Graph, arguments: &[NodeId]) {
+        let contraction = contraction::of_stretch(g, self, arguments);
+        if !contraction.values.is_empty() {
+            g.note_contraction(contraction);
+        }
     }
 
     /// Returns the entries of R as rules.
