@@ -29,7 +29,9 @@ pub enum Path {
 /// ```
 /// let source = "energy Pull(p, q: Point; k: Scalar) { k / 2 * norm_squared(p - q) }";
 /// let listing = energy_compiler::Listing::from_source(source).unwrap().remove(0);
-/// assert!(listing.routine("hessian").unwrap().contains("fn hessian_at<L: ::energy_dsl::Level>"));
+/// let hessian = listing.routine("hessian").unwrap();
+/// assert!(hessian.contains("fn hessian_at<L: ::energy_dsl::Level>"));
+/// assert!(hessian.contains("fn reduced_hessian_at<L: ::energy_dsl::Level>") && hessian.contains("fn expand<"));
 /// assert!(listing.plans().contains("adjoint-weighted"));
 /// assert!(listing.plans().contains("of 10,000,000 steps to compile"));
 /// ```
@@ -93,13 +95,21 @@ impl Listing {
         layout(&self.code)
     }
 
-    /// Returns the method of a routine (`value`, `hessian`, …), with its ordinary and its general path.
+    /// Returns the method of a routine (`value`, `hessian`, …), with its ordinary and its general path. Where it only
+    /// expands the routine in reduced coordinates, these and the expansion follow.
     #[must_use]
     pub fn routine(&self, name: &str) -> Option<String> {
-        let parts = ["at", "has_guards", "if_ordinary", "in_general"];
-        let wanted = parts.map(|part| format!("{name}_{part}"));
-        let methods: Vec<String> =
-            methods(&self.code).into_iter().filter(|(name, _)| wanted.contains(name)).map(|(_, text)| text).collect();
+        let all = methods(&self.code);
+        let methods_of = |name: &str| {
+            let wanted = ["at", "has_guards", "if_ordinary", "in_general"].map(|part| format!("{name}_{part}"));
+            all.iter().filter(move |(name, _)| wanted.contains(name)).map(|(_, text)| text.clone())
+        };
+        let mut methods: Vec<String> = methods_of(name).collect();
+        let reduced = format!("reduced_{name}");
+        if methods.iter().any(|text| text.contains(&format!("{reduced}_at::<L>"))) {
+            methods.extend(methods_of(&reduced));
+            methods.extend(all.iter().filter(|(name, _)| name == "expand").map(|(_, text)| text.clone()));
+        }
         (!methods.is_empty()).then(|| methods.join("\n"))
     }
 
