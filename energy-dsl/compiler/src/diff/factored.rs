@@ -27,6 +27,8 @@ struct Term {
 
 /// The most products of a sum that is factored.
 const MOST: usize = 64;
+/// The most factors into which a product is taken apart. Powers by squaring would have very many.
+const MOST_FACTORS: usize = 16;
 
 impl Term {
     /// Takes apart the product of some nodes, but not those up to the last one `of_formula`.
@@ -43,7 +45,12 @@ impl Term {
                     term.constant = -term.constant;
                     stack.push((a, side));
                 }
-                Op::Mul(a, b) if node > of_formula && !g.is_scale(a) && !g.is_scale(b) => {
+                Op::Mul(a, b)
+                    if node > of_formula
+                        && !g.is_scale(a)
+                        && !g.is_scale(b)
+                        && term.factors.len() + stack.len() < MOST_FACTORS =>
+                {
                     stack.extend([(a, side), (b, side)]);
                 }
                 _ => term.factors.push((g.as_computed(node), side)),
@@ -121,6 +128,7 @@ fn factored(g: &mut Graph, of_formula: NodeId, terms: Vec<Term>) -> Term {
             }
             _ => {}
         }
+        g.budget().spend(terms.len() as u64, 0);
         let Some(common) = most_shared(&terms) else { break };
         let (with, others): (Vec<_>, Vec<_>) = terms.into_iter().partition(|term| term.has(&common));
         let with: Vec<Term> =
@@ -175,6 +183,13 @@ impl Factored {
         Self { n, of_formula, origin: 0, terms: BTreeMap::new() }
     }
 
+    /// Returns the product of some weights, x and y.
+    fn term(&self, g: &Graph, weights: &[NodeId], x: NodeId, y: NodeId) -> Term {
+        let weights = weights.iter().map(|&weight| (weight, Side::Weight));
+        let factors: Vec<Factor> = weights.chain([(x, Side::Left), (y, Side::Right)]).collect();
+        Term::of(g, self.of_formula, &factors)
+    }
+
     fn put(&mut self, (i, j): (usize, usize), part: usize, term: Term) {
         self.terms.entry(i * self.n + j).or_default().entry((self.origin, part)).or_default().push(term);
     }
@@ -182,7 +197,6 @@ impl Factored {
 
 /// Returns Σ terms, factored unless they are many.
 fn sum(g: &mut Graph, of_formula: NodeId, terms: Vec<Term>) -> NodeId {
-    g.budget().spend(terms.len() as u64, 0);
     if terms.len() <= MOST {
         return factored(g, of_formula, terms).node(g);
     }
@@ -202,16 +216,12 @@ impl Summation for Factored {
         let mut sums: BTreeMap<usize, Vec<Term>> = BTreeMap::new();
         for &(factor, parts) in terms {
             for &(coordinate, part) in parts {
-                sums.entry(coordinate).or_default().push(Term::of(
-                    g,
-                    self.of_formula,
-                    &[(factor, Side::Weight), (part, Side::Weight)],
-                ));
+                let term = Term::of(g, self.of_formula, &[factor, part].map(|node| (node, Side::Weight)));
+                sums.entry(coordinate).or_default().push(term);
             }
         }
         let sums = sums.into_iter().map(|(coordinate, terms)| (coordinate, sum(g, self.of_formula, terms)));
-        let sums: Sparse = sums.collect();
-        sums.into_iter().filter(|&(_, sum)| !g.is(sum, 0.0)).collect()
+        sums.collect::<Sparse>().into_iter().filter(|&(_, sum)| !g.is(sum, 0.0)).collect()
     }
 
     fn next(&mut self) {
@@ -220,7 +230,7 @@ impl Summation for Factored {
 
     fn add(&mut self, g: &mut Graph, weight: NodeId, (a, b): (&Sparse, &Sparse), same: bool) {
         for (&(i, x), &(j, y)) in a.iter().flat_map(|x| b.iter().map(move |y| (x, y))) {
-            let term = Term::of(g, self.of_formula, &[(weight, Side::Weight), (x, Side::Left), (y, Side::Right)]);
+            let term = self.term(g, &[weight], x, y);
             if i <= j {
                 self.put((i, j), 0, term.clone());
             }
@@ -233,14 +243,10 @@ impl Summation for Factored {
     fn add_form(&mut self, g: &mut Graph, form: &[Vec<Product>], of: &[&Sparse]) {
         let places = (0..of.len()).flat_map(|k| (0..of.len()).map(move |l| (k, l)));
         for ((k, l), products) in places.zip(form) {
-            for (&(i, x), &(j, y)) in of[k].iter().flat_map(|x| of[l].iter().map(move |y| (x, y))) {
-                if i > j {
-                    continue;
-                }
-                for (part, factors) in products.iter().enumerate() {
-                    let weights: Vec<Factor> = factors.iter().map(|&factor| (factor, Side::Weight)).collect();
-                    let term =
-                        Term::of(g, self.of_formula, &[&weights[..], &[(x, Side::Left), (y, Side::Right)]].concat());
+            let pairs = of[k].iter().flat_map(|x| of[l].iter().map(move |y| (x, y)));
+            for (&(i, x), &(j, y)) in pairs.filter(|((i, _), (j, _))| i <= j) {
+                for (part, weights) in products.iter().enumerate() {
+                    let term = self.term(g, weights, x, y);
                     self.put((i, j), part, term);
                 }
             }
@@ -248,7 +254,7 @@ impl Summation for Factored {
     }
 
     fn add_to_entry(&mut self, g: &mut Graph, place: (usize, usize), x: NodeId, y: NodeId) {
-        let term = Term::of(g, self.of_formula, &[(x, Side::Left), (y, Side::Right)]);
+        let term = self.term(g, &[], x, y);
         self.put(place, 0, term);
     }
 
