@@ -6,6 +6,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::adjoint::{self, Weighted};
 use super::coordinates::Coordinates;
+use super::factored::Factored;
 use super::forward::{self, Sparse};
 use super::local::Order;
 use super::outer_products::{AsTheyCome, Summation};
@@ -29,6 +30,8 @@ pub(super) struct Gathered {
 /// Derivatives of U with respect to the nodes of cuts.
 pub(super) struct ByCut {
     known: BTreeMap<Vec<NodeId>, Gathered>,
+    /// The last node of the formula, if common factors are taken out.
+    factored: Option<NodeId>,
     /// Steps of the compiler after which no more cuts are looked for.
     last_step: u64,
 }
@@ -37,8 +40,8 @@ pub(super) struct ByCut {
 const STEPS: u64 = 2_000_000;
 
 impl ByCut {
-    pub(super) fn new(g: &Graph) -> Self {
-        Self { known: BTreeMap::new(), last_step: g.budget().progress().steps.saturating_add(STEPS) }
+    pub(super) fn new(g: &Graph, factored: Option<NodeId>) -> Self {
+        Self { known: BTreeMap::new(), factored, last_step: g.budget().progress().steps.saturating_add(STEPS) }
     }
 
     /// Returns whether there are steps left.
@@ -132,8 +135,11 @@ fn by_cut(g: &mut Graph, output: NodeId, cut: &[NodeId], known: &mut ByCut) -> G
         if !known.goes_on(g) {
             break;
         }
-        let sums = AsTheyCome::new(coordinates.len());
-        if let Some(found) = derivatives(g, output, &waist, &coordinates, known, sums) {
+        let n = coordinates.len();
+        let plain = derivatives(g, output, &waist, &coordinates, known, AsTheyCome::new(n));
+        let factored =
+            known.factored.and_then(|end| derivatives(g, output, &waist, &coordinates, known, Factored::new(n, end)));
+        for found in [plain, factored].into_iter().flatten() {
             let cost = found.cost(g);
             if cost < least {
                 (best, least) = (found, cost);

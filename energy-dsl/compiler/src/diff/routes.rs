@@ -201,7 +201,7 @@ fn second_derivatives(g: &mut Graph, value: NodeId, coordinates: &Coordinates) -
             offer(g, "adjoint-weighted, reverse gradient", gradient, &entries, safe);
         }
     }
-    alternatives.extend(gathered(g, value, coordinates, gradients.apart.as_ref(), || AsTheyCome::new(n)));
+    alternatives.extend(gathered(g, value, coordinates, gradients.apart.as_ref(), None, || AsTheyCome::new(n)));
     alternatives
 }
 
@@ -209,7 +209,7 @@ fn second_derivatives(g: &mut Graph, value: NodeId, coordinates: &Coordinates) -
 fn factored_derivatives(g: &mut Graph, value: NodeId, coordinates: &Coordinates) -> Vec<Alternative> {
     let (n, of_formula) = (coordinates.len(), g.last());
     let apart = is_computed_otherwise(g, value).then(|| gradients(g, value, coordinates).apart).flatten();
-    let list = gathered(g, value, coordinates, apart.as_ref(), || Factored::new(n, of_formula));
+    let list = gathered(g, value, coordinates, apart.as_ref(), Some(of_formula), || Factored::new(n, of_formula));
     let mut alternatives: Vec<_> = list.into_iter().map(|route| Alternative { factored: true, ..route }).collect();
     if !alternatives.is_empty() && !alternatives.iter().any(|route| route.safe) {
         let gradient = forward::first_derivatives(g, &[value], coordinates, Order::First).remove(0);
@@ -226,12 +226,13 @@ fn gathered<S: Summation>(
     value: NodeId,
     coordinates: &Coordinates,
     apart: Option<&(Vec<NodeId>, bool)>,
+    of_formula: Option<NodeId>,
     sums: impl Fn() -> S,
 ) -> Vec<Alternative> {
     let primitives = cut::primitives(g, value, coordinates).map(|cut| ("gathered at primitives", cut));
     let waists = cut::waists(g, value, coordinates, Order::Second).into_iter();
     let waists = waists.map(|cut| ("gathered at a waist", cut));
-    let mut by_cut = cut::ByCut::new(g);
+    let mut by_cut = cut::ByCut::new(g, of_formula);
     let mut alternatives = Vec::new();
     for (name, cut) in primitives.into_iter().chain(waists) {
         if !by_cut.goes_on(g) {
