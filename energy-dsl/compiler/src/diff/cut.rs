@@ -8,6 +8,7 @@ use super::adjoint::{self, Weighted};
 use super::coordinates::Coordinates;
 use super::factored::Factored;
 use super::forward::{self, Sparse};
+use super::linear_part::LinearPart;
 use super::local::Order;
 use super::outer_products::{AsTheyCome, Summation};
 use super::{differentiable, is_computed_otherwise, moving_operands};
@@ -129,7 +130,10 @@ fn by_cut(g: &mut Graph, output: NodeId, cut: &[NodeId], known: &mut ByCut) -> G
             Gathered { gradient, hessian: forward::second_derivatives(g, output, &coordinates), safe: true }
         }
     };
-    let waists = if cut.len() < NESTED { Vec::new() } else { waists(g, output, &coordinates, Order::Second) };
+    let mut waists = if cut.len() < NESTED { Vec::new() } else { waists(g, output, &coordinates, Order::Second) };
+    if known.factored.is_some() && cut.len() >= NESTED {
+        waists.extend(LinearPart::new(g, output, &coordinates, Order::Second).narrowest());
+    }
     let mut least = best.cost(g);
     for waist in waists {
         if !known.goes_on(g) {
@@ -160,29 +164,6 @@ impl Gathered {
 /// Returns what nodes cost on the ordinary path.
 pub(super) fn cost(g: &mut Graph, nodes: &[NodeId]) -> usize {
     ordinary(g, nodes).map_or_else(|| count(g, nodes), |(nodes, _)| count(g, &nodes)).cost()
-}
-
-/// Returns the linear functions of the coordinates that U is computed from, unless they are more than the coordinates.
-fn linear_front(g: &Graph, output: NodeId, coordinates: &Coordinates, order: Order) -> Option<Vec<NodeId>> {
-    let mut linear: BTreeSet<NodeId> = BTreeSet::new();
-    let mut front: BTreeSet<NodeId> = BTreeSet::new();
-    for node in differentiable(g, &[output], order) {
-        let operands = moving_operands(g, node, order);
-        let moving = || operands.iter().filter(|&&operand| g.varies(operand));
-        let is_linear = match g.op(node) {
-            Op::Add(..) | Op::Sub(..) | Op::Neg(_) => true,
-            Op::Mul(a, b) => !(g.varies(a) && g.varies(b)),
-            Op::Div(_, divisor) => !g.varies(divisor),
-            _ => false,
-        };
-        if coordinates.seeds.contains_key(&node) || is_linear && moving().all(|operand| linear.contains(operand)) {
-            linear.insert(node);
-        } else {
-            front.extend(moving().filter(|operand| linear.contains(operand)));
-        }
-    }
-    let is_inner = front.iter().any(|node| !coordinates.seeds.contains_key(node));
-    (is_inner && front.len() > 1 && front.len() <= coordinates.len()).then(|| front.into_iter().collect())
 }
 
 /// Fronts of the graph between U and the coordinates. A node of a front is replaced by its operands once no other node
@@ -263,7 +244,7 @@ pub(super) fn waists(g: &Graph, output: NodeId, coordinates: &Coordinates, order
         waists.swap(MOST_WAISTS - 1, last);
         waists.truncate(MOST_WAISTS);
     }
-    let linear = linear_front(g, output, coordinates, order).filter(|cut| !waists.contains(cut));
+    let linear = LinearPart::new(g, output, coordinates, order).front().filter(|cut| !waists.contains(cut));
     waists.into_iter().chain(linear).collect()
 }
 

@@ -13,10 +13,12 @@ mod expand;
 mod factored;
 mod forward;
 mod linear;
+mod linear_part;
 mod local;
 mod outer_products;
 mod routes;
 mod unknowns;
+mod vertex_cut;
 mod weights;
 
 pub use coordinates::Coordinates;

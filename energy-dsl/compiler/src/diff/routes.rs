@@ -3,7 +3,9 @@
 use std::collections::BTreeMap;
 
 use super::coordinates::Coordinates;
+use super::cut::ByCut;
 use super::factored::Factored;
+use super::linear_part::LinearPart;
 use super::local::Order;
 use super::outer_products::{AsTheyCome, Summation};
 use super::{adjoint, cut, differentiable, forward, is_computed_otherwise};
@@ -201,16 +203,26 @@ fn second_derivatives(g: &mut Graph, value: NodeId, coordinates: &Coordinates) -
             offer(g, "adjoint-weighted, reverse gradient", gradient, &entries, safe);
         }
     }
-    alternatives.extend(gathered(g, value, coordinates, gradients.apart.as_ref(), None, || AsTheyCome::new(n)));
+    let (cuts, mut by_cut) = (cuts(g, value, coordinates), ByCut::new(g, None));
+    let plain = || AsTheyCome::new(n);
+    alternatives.extend(gathered(g, value, coordinates, gradients.apart.as_ref(), (&cuts, &mut by_cut), plain));
     alternatives
 }
 
-/// Returns the routes on which common factors are taken out of sums of products.
+/// Returns the routes on which common factors are taken out of sums of products, and those through the narrowest cut of
+/// the linear part.
 fn factored_derivatives(g: &mut Graph, value: NodeId, coordinates: &Coordinates) -> Vec<Alternative> {
     let (n, of_formula) = (coordinates.len(), g.last());
     let apart = is_computed_otherwise(g, value).then(|| gradients(g, value, coordinates).apart).flatten();
-    let list = gathered(g, value, coordinates, apart.as_ref(), Some(of_formula), || Factored::new(n, of_formula));
+    let narrowest = LinearPart::new(g, value, coordinates, Order::Second).narrowest();
+    let narrowest: Vec<Cut> = narrowest.map(|cut| ("gathered at a waist", cut)).into_iter().collect();
+    let all = [cuts(g, value, coordinates), narrowest.clone()].concat();
+    let mut by_cut = ByCut::new(g, Some(of_formula));
+    let factored = || Factored::new(n, of_formula);
+    let list = gathered(g, value, coordinates, apart.as_ref(), (&all, &mut by_cut), factored);
     let mut alternatives: Vec<_> = list.into_iter().map(|route| Alternative { factored: true, ..route }).collect();
+    let plain = || AsTheyCome::new(n);
+    alternatives.extend(gathered(g, value, coordinates, apart.as_ref(), (&narrowest, &mut by_cut), plain));
     if !alternatives.is_empty() && !alternatives.iter().any(|route| route.safe) {
         let gradient = forward::first_derivatives(g, &[value], coordinates, Order::First).remove(0);
         let entries = forward::second_derivatives(g, value, coordinates);
@@ -220,25 +232,30 @@ fn factored_derivatives(g: &mut Graph, value: NodeId, coordinates: &Coordinates)
     alternatives
 }
 
+/// A cut, and the name of the route through it.
+type Cut = (&'static str, Vec<NodeId>);
+
+fn cuts(g: &Graph, value: NodeId, coordinates: &Coordinates) -> Vec<Cut> {
+    let primitives = cut::primitives(g, value, coordinates).map(|cut| ("gathered at primitives", cut));
+    let waists = cut::waists(g, value, coordinates, Order::Second).into_iter();
+    primitives.into_iter().chain(waists.map(|cut| ("gathered at a waist", cut))).collect()
+}
+
 /// Returns the routes on which derivatives are gathered at cuts, with this gradient if it is that of other nodes.
 fn gathered<S: Summation>(
     g: &mut Graph,
     value: NodeId,
     coordinates: &Coordinates,
     apart: Option<&(Vec<NodeId>, bool)>,
-    of_formula: Option<NodeId>,
+    (cuts, by_cut): (&[Cut], &mut ByCut),
     sums: impl Fn() -> S,
 ) -> Vec<Alternative> {
-    let primitives = cut::primitives(g, value, coordinates).map(|cut| ("gathered at primitives", cut));
-    let waists = cut::waists(g, value, coordinates, Order::Second).into_iter();
-    let waists = waists.map(|cut| ("gathered at a waist", cut));
-    let mut by_cut = cut::ByCut::new(g, of_formula);
     let mut alternatives = Vec::new();
-    for (name, cut) in primitives.into_iter().chain(waists) {
+    for (name, cut) in cuts {
         if !by_cut.goes_on(g) {
             break;
         }
-        let Some(found) = cut::derivatives(g, value, &cut, coordinates, &mut by_cut, sums()) else { continue };
+        let Some(found) = cut::derivatives(g, value, cut, coordinates, by_cut, sums()) else { continue };
         let (gradient, is_safe) = match apart {
             Some((gradient, is_safe)) => (gradient, *is_safe),
             None => (&found.gradient, true),
