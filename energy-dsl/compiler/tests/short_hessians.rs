@@ -3,7 +3,7 @@
 use energy_compiler::Listing;
 
 /// A formula, and the most operations of its reduced Hessian.
-const FORMULAS: [(&str, usize); 17] = [
+const FORMULAS: [(&str, usize); 18] = [
     // With s = ‖d‖², ∇²U = 2 f′ I + 4 f″ d dᵀ: 6 for s, 8 for f, 12 for f′ and f″, 6 for each product, 9 for ∇U.
     ("energy LennardJones(p, q: Point; k, s: Scalar) { let r = s^2 / norm_squared(p - q); 4 * k * (r^6 - r^3) }", 70),
     // f of a length: its derivatives are scalars.
@@ -35,6 +35,18 @@ const FORMULAS: [(&str, usize); 17] = [
         let d = (a0 + a1) / 2 - (b0 + b1) / 2; k * ((r^2 / norm_squared(d))^2 + norm_squared(d) / r^2 - 2)
       }",
         75,
+    ),
+    // Nine differences of three points on each of two curves: 27 numbers, but 18 of the points. By hand 2,500: 45 for each
+    // pair, 144 for the points, 1,728 to sum 3 × 3 blocks over both points of each pair of control points.
+    (
+        "energy QuadraturePoints(a: [Point; 4], b: [Point; 4]; w: [Vec4; 3], r, k: Scalar) {
+        k * sum(i in 0..3, sum(j in 0..3, {
+            let p = sum(n in 0..4, w[i][n] * a[n]); let q = sum(n in 0..4, w[j][n] * b[n]);
+            let s = norm_squared(p - q) / r^2;
+            if s < 1 { 1 / s + s - 2 } else { 0 }
+        }))
+      }",
+        3000,
     ),
     // A gap and two mean edges: nine linear functions of eighteen coordinates.
     (
