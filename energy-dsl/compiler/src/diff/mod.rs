@@ -3,7 +3,8 @@
 //! Inputs are first *reduced*: if points enter only as differences or as other linear functions (`linear.rs`),
 //! derivatives are taken with respect to these (`coordinates.rs`). First derivatives flow forward as sparse dual parts
 //! (`forward.rs`) or back from the outputs (`adjoint.rs`). Second derivatives flow forward, weighted by adjoints, or
-//! are gathered at a few primitives (`cut.rs`). `routes.rs` takes the cheapest route.
+//! are gathered at cuts (`cut.rs`). They are sums of outer products (`outer_products.rs`), whose common factors may be
+//! taken out (`factored.rs`). `routes.rs` takes the cheapest route.
 
 mod adjoint;
 mod coordinates;
