@@ -149,16 +149,75 @@ const FORMULAS: [(&str, usize); 18] = [
     ),
 ];
 
+/// Potentials of a tetrahedron with F = D B: parameters, formula, and the operations of SymPy 1.14 for value, gradient
+/// and Hessian in the nine coordinates D, as `count_with_sympy.py` counts them.
+const OF_TETRAHEDRA: [(&str, &str, &str, usize); 13] = [
+    ("NeoHookean", "μ, λ: Scalar", "let J = det(F); μ / 2 * (ddot(F, F) - 3) - μ * log(J) + λ / 2 * log(J)^2", 874),
+    (
+        "MooneyRivlin",
+        "μ, λ, κ: Scalar",
+        "let C = transpose(F) * F; let J = det(F); let I1 = trace(C); let I2 = (I1^2 - ddot(C, C)) / 2;
+        μ * (I1 * J^(-2/3) - 3) + λ * (I2 * J^(-4/3) - 3) + κ * (J - 1)^2",
+        3539,
+    ),
+    ("Fung", "a, b: Scalar", "let E = (transpose(F) * F - identity(3)) / 2; a * (exp(b * ddot(E, E)) - 1)", 1216),
+    (
+        "Fibres",
+        "c, a, b: Scalar, d, e: Vec3",
+        "let C = transpose(F) * F; let p = dot(d, C * d) - 1; let q = dot(e, C * e) - 1;
+        c * (trace(C) - 3) + a / (2 * b) * (exp(b * p^2) + exp(b * q^2) - 2)",
+        1588,
+    ),
+    ("Conformal", "k: Scalar", "k * ddot(F, F) / det(F)^(2/3)", 896),
+    ("Cofactors", "k: Scalar", "let A = adjugate(F); k * ddot(A, A) / det(F)^2 + k * ddot(F, F)", 1761),
+    (
+        "StVenantKirchhoff",
+        "μ, λ: Scalar",
+        "let E = (transpose(F) * F - identity(3)) / 2; μ * ddot(E, E) + λ / 2 * trace(E)^2",
+        1327,
+    ),
+    ("Biderman", "a, b, c: Scalar", "let I = ddot(F, F) - 3; a * I + b * I^2 + c * I^3 + (det(F) - 1)^2", 1065),
+    ("Anisotropic", "A: Mat3x3, k: Scalar", "let C = transpose(F) * F; k * ddot(A * C, C * A)", 3593),
+    (
+        "SmallStrain",
+        "μ, λ: Scalar",
+        "let e = (F + transpose(F)) / 2 - identity(3); μ * ddot(e, e) + λ / 2 * trace(e)^2",
+        384,
+    ),
+    ("Face", "k: Scalar", "let n = adjugate(transpose(F)) * vector(0, 0, 1); k * norm_squared(n)", 336),
+    ("SymmetricDirichlet", "k: Scalar", "let G = inverse(F); k * (ddot(F, F) + ddot(G, G))", 4049),
+    ("Opposite", "k: Scalar", "let E = F - transpose(inverse(F)); k * ddot(E, E)", 5139),
+];
+
+/// Returns the name of a formula, the operations of its reduced Hessian, and the routes to it.
+fn of_hessian(source: &str) -> (String, usize, String) {
+    let listing = Listing::from_source(source).expect("a sound formula").remove(0);
+    let plans = listing.plans();
+    let row = plans.lines().find(|line| line.contains("taken")).expect("a route is taken");
+    let count = row.split_once(" operations").and_then(|(first, _)| first.split_whitespace().last()).expect("a count");
+    let count = count.parse().expect("a number");
+    println!("{}: {count} operations", listing.name());
+    (listing.name().to_owned(), count, plans)
+}
+
 #[test]
 fn hessians_are_gathered_at_narrow_parts() {
     for (source, most) in FORMULAS {
-        let listing = Listing::from_source(source).expect("a sound formula").remove(0);
-        let plans = listing.plans();
-        let row = plans.lines().find(|line| line.contains("taken")).expect("a route is taken");
-        let count =
-            row.split_once(" operations").and_then(|(first, _)| first.split_whitespace().last()).expect("a count");
-        let count: usize = count.parse().expect("a number");
-        println!("{}: {count} operations", listing.name());
-        assert!(count <= most, "{}: {count} operations, more than {most}\n{plans}", listing.name());
+        let (name, count, plans) = of_hessian(source);
+        assert!(count <= most, "{name}: {count} operations, more than {most}\n{plans}");
+    }
+}
+
+#[test]
+fn hessians_are_shorter_than_common_subexpressions_of_sympy() {
+    for (name, parameters, formula, by_sympy) in OF_TETRAHEDRA {
+        let (name, count, plans) = of_hessian(&format!(
+            "energy {name}(x0, x1, x2, x3: Point; rest X0, X1, X2, X3: Point; {parameters}) {{
+                rest {{ let B = inverse(columns(X1 - X0, X2 - X0, X3 - X0)); }}
+                let F = columns(x1 - x0, x2 - x0, x3 - x0) * B;
+                {formula}
+            }}"
+        ));
+        assert!(count < by_sympy, "{name}: {count} operations, {by_sympy} by SymPy\n{plans}");
     }
 }
