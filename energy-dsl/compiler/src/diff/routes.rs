@@ -40,12 +40,12 @@ pub struct Route {
     pub cost: usize,
 }
 
-/// The routes to the derivatives of a routine. The first one was chosen.
+/// The routes to the derivatives of a routine.
 #[derive(Clone, Debug)]
 pub struct Routes {
     /// Name of the routine.
     pub routine: &'static str,
-    /// Routes by increasing cost.
+    /// The route that was taken, and the others by increasing cost.
     pub list: Vec<Route>,
 }
 
