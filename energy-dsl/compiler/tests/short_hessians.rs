@@ -3,7 +3,7 @@
 use energy_compiler::Listing;
 
 /// A formula, and the most operations of its reduced Hessian.
-const FORMULAS: [(&str, usize); 19] = [
+const FORMULAS: [(&str, usize); 18] = [
     // With s = ‖d‖², ∇²U = 2 f′ I + 4 f″ d dᵀ: 6 for s, 8 for f, 12 for f′ and f″, 6 for each product, 9 for ∇U.
     ("energy LennardJones(p, q: Point; k, s: Scalar) { let r = s^2 / norm_squared(p - q); 4 * k * (r^6 - r^3) }", 70),
     // f of a length: its derivatives are scalars.
@@ -122,16 +122,6 @@ const FORMULAS: [(&str, usize); 19] = [
         let F = columns(x1 - x0, x2 - x0, x3 - x0) * B; let G = inverse(F); μ * (ddot(F, F) + ddot(G, G))
       }",
         650,
-    ),
-    // With F = D R and N = R Rᵀ, each entry of ∇²U has products of (D N)(D N), of (F Fᵀ) N, and of R S Rᵀ with the stress
-    // S. By hand 630: 45 for each of F, D N and ∇U, 30 for each of FᵀF, F Fᵀ and N, 75 for R S Rᵀ, 7 for each entry.
-    (
-        "energy StVenantKirchhoff(x0, x1, x2, x3: Point; rest X0, X1, X2, X3: Point; μ, λ: Scalar) {
-        rest { let B = inverse(columns(X1 - X0, X2 - X0, X3 - X0)); }
-        let F = columns(x1 - x0, x2 - x0, x3 - x0) * B; let E = (transpose(F) * F - identity(3)) / 2;
-        μ * ddot(E, E) + λ / 2 * trace(E)^2
-      }",
-        730,
     ),
     // ‖F − R‖² and tr S have closed second derivatives, however they are spelled.
     (

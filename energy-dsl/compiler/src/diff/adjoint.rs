@@ -4,7 +4,6 @@ use std::collections::BTreeMap;
 
 use super::coordinates::Coordinates;
 use super::forward::{Sparse, tangents, tangents_by};
-use super::halves::halves;
 use super::local::{Order, local};
 use super::outer_products::Summation;
 use super::{accumulate, differentiable};
@@ -98,7 +97,6 @@ pub(super) fn second_derivatives<S: Summation>(
     let tangents = tangents_by(g, &roots, coordinates, Order::Second, &sums);
     let adjoints = adjoints(g, outputs, coordinates, Order::Second);
     let none = Sparse::new();
-    let halves = if sums.in_halves() { halves(g, &nodes, &tangents, coordinates, &sums) } else { BTreeMap::new() };
     let contractions = g.contractions_of(|value| nodes.contains(&value) && !coordinates.seeds.contains_key(&value));
     for contraction in &contractions {
         let weights = contraction.weights(g, |value| adjoints.get(&value).copied());
@@ -116,19 +114,10 @@ pub(super) fn second_derivatives<S: Summation>(
         let local = local(g, node, Order::Second);
         sums.next();
         for (i, j, products_of) in local.second {
-            let (x, y, same) = (local.operands[i], local.operands[j], i == j);
+            let a = tangents.get(&local.operands[i]).unwrap_or(&none);
+            let b = tangents.get(&local.operands[j]).unwrap_or(&none);
             let weight = g.sum_of_products(Some(weight), &products_of);
-            let Some(([a, b], [c, d])) = halves.get(&x).zip(halves.get(&y)) else {
-                let [a, b] = [x, y].map(|operand| tangents.get(&operand).unwrap_or(&none));
-                sums.add(g, 0, weight, (a, b), same);
-                continue;
-            };
-            sums.add(g, 0, weight, (a, c), same);
-            sums.add(g, 0, weight, (b, d), same);
-            sums.add(g, 1, weight, (a, d), false);
-            if !same {
-                sums.add(g, 1, weight, (b, c), false);
-            }
+            sums.add(g, weight, (a, b), i == j);
         }
     }
     Some(sums)

@@ -6,7 +6,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::adjoint::{self, Weighted};
 use super::coordinates::Coordinates;
-use super::factored::{Factored, Factoring};
+use super::factored::Factored;
 use super::forward::{self, Sparse};
 use super::linear_part::LinearPart;
 use super::local::Order;
@@ -31,8 +31,8 @@ pub(super) struct Gathered {
 /// Derivatives of U with respect to the nodes of cuts.
 pub(super) struct ByCut {
     known: BTreeMap<Vec<NodeId>, Gathered>,
-    /// What is taken apart, if common factors are taken out.
-    factored: Option<Factoring>,
+    /// The last node of the formula, if common factors are taken out.
+    factored: Option<NodeId>,
     /// Steps of the compiler after which no more cuts are looked for.
     last_step: u64,
 }
@@ -41,7 +41,7 @@ pub(super) struct ByCut {
 const STEPS: u64 = 2_000_000;
 
 impl ByCut {
-    pub(super) fn new(g: &Graph, factored: Option<Factoring>) -> Self {
+    pub(super) fn new(g: &Graph, factored: Option<NodeId>) -> Self {
         Self { known: BTreeMap::new(), factored, last_step: g.budget().progress().steps.saturating_add(STEPS) }
     }
 
@@ -142,7 +142,7 @@ fn by_cut(g: &mut Graph, output: NodeId, cut: &[NodeId], known: &mut ByCut) -> G
         let n = coordinates.len();
         let plain = derivatives(g, output, &waist, &coordinates, known, AsTheyCome::new(n));
         let factored =
-            known.factored.and_then(|of| derivatives(g, output, &waist, &coordinates, known, Factored::new(n, of)));
+            known.factored.and_then(|end| derivatives(g, output, &waist, &coordinates, known, Factored::new(n, end)));
         for found in [plain, factored].into_iter().flatten() {
             let cost = found.cost(g);
             if cost < least {

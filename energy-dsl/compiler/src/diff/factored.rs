@@ -168,34 +168,26 @@ fn most_shared(terms: &[Term]) -> Option<Vec<Factor>> {
     Some(best.0)
 }
 
-/// What is taken apart.
-#[derive(Clone, Copy)]
-pub(super) struct Factoring {
-    /// The last node of the formula. Its products stay whole, because others use them.
-    pub(super) of_formula: NodeId,
-    /// Whether derivatives of inner products are added in halves.
-    pub(super) in_halves: bool,
-}
-
 /// Terms are collected, and common factors are taken out in the end.
 pub(super) struct Factored {
     n: usize,
-    of: Factoring,
+    /// The last node of the formula. Its products stay whole, because others use them.
+    of_formula: NodeId,
     origin: usize,
     /// By entry, and by origin and part of the weight: terms of one origin share factors.
     terms: BTreeMap<usize, BTreeMap<(usize, usize), Vec<Term>>>,
 }
 
 impl Factored {
-    pub(super) fn new(n: usize, of: Factoring) -> Self {
-        Self { n, of, origin: 0, terms: BTreeMap::new() }
+    pub(super) fn new(n: usize, of_formula: NodeId) -> Self {
+        Self { n, of_formula, origin: 0, terms: BTreeMap::new() }
     }
 
     /// Returns the product of some weights, x and y.
     fn term(&self, g: &Graph, weights: &[NodeId], x: NodeId, y: NodeId) -> Term {
         let weights = weights.iter().map(|&weight| (weight, Side::Weight));
         let factors: Vec<Factor> = weights.chain([(x, Side::Left), (y, Side::Right)]).collect();
-        Term::of(g, self.of.of_formula, &factors)
+        Term::of(g, self.of_formula, &factors)
     }
 
     fn put(&mut self, (i, j): (usize, usize), part: usize, term: Term) {
@@ -224,11 +216,11 @@ impl Summation for Factored {
         let mut sums: BTreeMap<usize, Vec<Term>> = BTreeMap::new();
         for &(factor, parts) in terms {
             for &(coordinate, part) in parts {
-                let term = Term::of(g, self.of.of_formula, &[factor, part].map(|node| (node, Side::Weight)));
+                let term = Term::of(g, self.of_formula, &[factor, part].map(|node| (node, Side::Weight)));
                 sums.entry(coordinate).or_default().push(term);
             }
         }
-        let sums = sums.into_iter().map(|(coordinate, terms)| (coordinate, sum(g, self.of.of_formula, terms)));
+        let sums = sums.into_iter().map(|(coordinate, terms)| (coordinate, sum(g, self.of_formula, terms)));
         sums.collect::<Sparse>().into_iter().filter(|&(_, sum)| !g.is(sum, 0.0)).collect()
     }
 
@@ -236,19 +228,14 @@ impl Summation for Factored {
         self.origin += 1;
     }
 
-    fn in_halves(&self) -> bool {
-        self.of.in_halves
-    }
-
-    fn add(&mut self, g: &mut Graph, part: usize, weight: NodeId, (a, b): (&Sparse, &Sparse), same: bool) {
+    fn add(&mut self, g: &mut Graph, weight: NodeId, (a, b): (&Sparse, &Sparse), same: bool) {
         for (&(i, x), &(j, y)) in a.iter().flat_map(|x| b.iter().map(move |y| (x, y))) {
+            let term = self.term(g, &[weight], x, y);
             if i <= j {
-                let term = self.term(g, &[weight], x, y);
-                self.put((i, j), part, term);
+                self.put((i, j), 0, term.clone());
             }
             if !same && j <= i {
-                let term = self.term(g, &[weight], y, x);
-                self.put((j, i), part, term);
+                self.put((j, i), 0, term);
             }
         }
     }
@@ -275,7 +262,7 @@ impl Summation for Factored {
         let zero = g.constant(0.0);
         let mut entries = BTreeMap::new();
         for (place, of_origins) in self.terms {
-            let sums: Vec<NodeId> = of_origins.into_values().map(|terms| sum(g, self.of.of_formula, terms)).collect();
+            let sums: Vec<NodeId> = of_origins.into_values().map(|terms| sum(g, self.of_formula, terms)).collect();
             entries.insert(place, sums.into_iter().fold(zero, |sum, term| g.accumulate(sum, term)));
         }
         entries

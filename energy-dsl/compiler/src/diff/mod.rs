@@ -13,7 +13,6 @@ mod dihedral;
 mod expand;
 mod factored;
 mod forward;
-mod halves;
 mod linear;
 mod linear_part;
 mod local;

@@ -14,11 +14,8 @@ pub(super) trait Summation {
     /// Begins the terms of another origin.
     fn next(&mut self);
 
-    /// Whether derivatives of inner products are added in halves.
-    fn in_halves(&self) -> bool;
-
-    /// Adds weight · a aᵀ, or weight · (a bᵀ + b aᵀ), to one of the parts of an origin.
-    fn add(&mut self, g: &mut Graph, part: usize, weight: NodeId, of: (&Sparse, &Sparse), same: bool);
+    /// Adds weight · a aᵀ, or weight · (a bᵀ + b aᵀ).
+    fn add(&mut self, g: &mut Graph, weight: NodeId, of: (&Sparse, &Sparse), same: bool);
 
     /// Adds Σ wᵢⱼ aᵢ aⱼᵀ for a symmetric matrix w, each entry a sum of products.
     fn add_form(&mut self, g: &mut Graph, form: &[Vec<Product>], of: &[&Sparse]);
@@ -54,15 +51,11 @@ impl Summation for AsTheyCome {
         for (i, j) in upper(of.len()) {
             let products: Vec<NodeId> = form[i * of.len() + j].iter().map(|product| g.product(None, product)).collect();
             let weight = g.sum(products);
-            self.add(g, 0, weight, (of[i], of[j]), i == j);
+            self.add(g, weight, (of[i], of[j]), i == j);
         }
     }
 
-    fn in_halves(&self) -> bool {
-        false
-    }
-
-    fn add(&mut self, g: &mut Graph, _: usize, weight: NodeId, (a, b): (&Sparse, &Sparse), same: bool) {
+    fn add(&mut self, g: &mut Graph, weight: NodeId, (a, b): (&Sparse, &Sparse), same: bool) {
         // Weights the shorter factor, which takes fewer products.
         let (shorter, longer) = if a.len() <= b.len() { (a, b) } else { (b, a) };
         let weighted: Sparse = shorter.iter().map(|&(c, part)| (c, g.mul(weight, part))).collect();

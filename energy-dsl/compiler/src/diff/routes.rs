@@ -4,8 +4,7 @@ use std::collections::BTreeMap;
 
 use super::coordinates::Coordinates;
 use super::cut::ByCut;
-use super::factored::{Factored, Factoring};
-use super::halves::is_inner_product;
+use super::factored::Factored;
 use super::linear_part::LinearPart;
 use super::local::Order;
 use super::outer_products::{AsTheyCome, Summation};
@@ -33,8 +32,6 @@ pub struct Route {
     pub gathered_at: Option<usize>,
     /// Whether common factors are taken out of sums of products.
     pub factored: bool,
-    /// Whether derivatives of inner products are then added in halves.
-    pub in_halves: bool,
     /// Whether inverses of matrices are differentiated as if their entries were spelled out.
     pub spelled_out: bool,
     /// Operations, including those of the value.
@@ -57,7 +54,6 @@ struct Alternative {
     name: &'static str,
     gathered_at: Option<usize>,
     factored: bool,
-    in_halves: bool,
     spelled_out: bool,
     /// Its derivatives.
     nodes: Vec<NodeId>,
@@ -67,7 +63,7 @@ struct Alternative {
 
 impl Alternative {
     fn new(g: &Graph, name: &'static str, nodes: Vec<NodeId>, safe: bool) -> Self {
-        Self { name, gathered_at: None, factored: false, in_halves: false, spelled_out: g.spells_out(), nodes, safe }
+        Self { name, gathered_at: None, factored: false, spelled_out: g.spells_out(), nodes, safe }
     }
 }
 
@@ -88,9 +84,8 @@ fn cheapest(
             None if !alternative.safe => continue,
             None => count(g, &nodes),
         };
-        let &Alternative { name, gathered_at, factored, in_halves, spelled_out, .. } = alternative;
-        let cost = count.cost();
-        order.push((number, Route { name, gathered_at, factored, in_halves, spelled_out, count, cost }));
+        let &Alternative { name, gathered_at, factored, spelled_out, .. } = alternative;
+        order.push((number, Route { name, gathered_at, factored, spelled_out, count, cost: count.cost() }));
     }
     order.sort_by_key(|(number, route)| (route.cost, *number));
     let best = &alternatives[order.first()?.0];
@@ -128,16 +123,13 @@ pub fn second_order(
     let alternatives = second_derivatives(g, value, coordinates);
     let (mut nodes, mut routes) = choose(g, routine, &[value], &alternatives);
     g.spell_out(false);
-    let has_halves = differentiable(g, &[value], Order::Second).into_iter().any(|node| is_inner_product(g, node));
-    for (spelled_out, in_halves) in [(false, false), (false, true), (true, false)] {
-        if spelled_out && !is_rational || in_halves && !has_halves {
-            continue;
-        }
+    let spellings = if is_rational { &[false, true][..] } else { &[false] };
+    for &spelled_out in spellings {
         let mut other = before.clone();
         let attempt = || {
             other.spell_out(spelled_out);
-            let mut alternatives = factored_derivatives(&mut other, value, coordinates, in_halves);
-            if is_rational && !spelled_out && !in_halves {
+            let mut alternatives = factored_derivatives(&mut other, value, coordinates);
+            if is_rational && !spelled_out {
                 alternatives.extend(second_derivatives(&mut other, value, coordinates));
             }
             cheapest(&mut other, routine, &[value], &alternatives)
@@ -219,17 +211,16 @@ fn second_derivatives(g: &mut Graph, value: NodeId, coordinates: &Coordinates) -
 
 /// Returns the routes on which common factors are taken out of sums of products, and those through the narrowest cut of
 /// the linear part.
-fn factored_derivatives(g: &mut Graph, value: NodeId, coordinates: &Coordinates, in_halves: bool) -> Vec<Alternative> {
-    let (n, of) = (coordinates.len(), Factoring { of_formula: g.last(), in_halves });
+fn factored_derivatives(g: &mut Graph, value: NodeId, coordinates: &Coordinates) -> Vec<Alternative> {
+    let (n, of_formula) = (coordinates.len(), g.last());
     let apart = is_computed_otherwise(g, value).then(|| gradients(g, value, coordinates).apart).flatten();
     let narrowest = LinearPart::new(g, value, coordinates, Order::Second).narrowest();
     let narrowest: Vec<Cut> = narrowest.map(|cut| ("gathered at a waist", cut)).into_iter().collect();
     let all = [cuts(g, value, coordinates), narrowest.clone()].concat();
-    let mut by_cut = ByCut::new(g, Some(of));
-    let factored = || Factored::new(n, of);
+    let mut by_cut = ByCut::new(g, Some(of_formula));
+    let factored = || Factored::new(n, of_formula);
     let list = gathered(g, value, coordinates, apart.as_ref(), (&all, &mut by_cut), factored);
-    let list = list.into_iter().map(|route| Alternative { factored: true, in_halves, ..route });
-    let mut alternatives: Vec<_> = list.collect();
+    let mut alternatives: Vec<_> = list.into_iter().map(|route| Alternative { factored: true, ..route }).collect();
     let plain = || AsTheyCome::new(n);
     alternatives.extend(gathered(g, value, coordinates, apart.as_ref(), (&narrowest, &mut by_cut), plain));
     if !alternatives.is_empty() && !alternatives.iter().any(|route| route.safe) {

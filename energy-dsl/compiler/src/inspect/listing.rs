@@ -231,7 +231,7 @@ fn name_of(route: &Route) -> String {
         Some(count) => format!("{} ({count} numbers)", route.name),
     };
     if route.factored {
-        name += if route.in_halves { ", factored in halves" } else { ", factored" };
+        name += ", factored";
     }
     if route.spelled_out {
         name += ", inverses spelled out";
