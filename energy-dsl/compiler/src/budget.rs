@@ -328,9 +328,7 @@ impl Budget {
             Err(panic) => resume_unwind(panic),
         })
     }
-}
 
-impl Budget {
     /// Runs a part that may be given up: `None` if it takes more than `most` steps, or half of those that are left, or
     /// more memory than is left. What it spends is returned, and not counted.
     pub(crate) fn attempt<T>(&self, most: u64, part: impl FnOnce() -> T) -> Option<(T, [u64; 2])> {

@@ -85,3 +85,16 @@ fn compile_time_is_at_most_quadratic_in_the_length_of_a_formula() {
     println!("40 lets: {:.1} ms, 160 lets: {:.1} ms, ratio {ratio:.1}", 1e3 * short, 1e3 * long);
     assert!(ratio <= 16.0, "160 lets take {ratio:.1} times as long to compile as 40");
 }
+
+#[test]
+fn sums_that_share_their_terms_are_visited_once() {
+    let mut text = "energy Shared(x0, x1, x2, x3: Point; k: Scalar) { let _s0 = x1 - x0; ".to_owned();
+    for i in 1..=60 {
+        write!(text, "let _s{i} = _s{} + k * _s{}; ", i - 1, i - 1).expect("writing to a string succeeds");
+    }
+    text += "let G = inverse(columns(_s60, x2 - x0, x3 - x0)); ddot(G, G) }";
+    let start = Instant::now();
+    assert!(Listing::from_source(&text).is_ok());
+    // There are 2⁶⁰ paths.
+    assert!(start.elapsed() < Duration::from_secs(60));
+}

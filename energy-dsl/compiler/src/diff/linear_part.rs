@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::coordinates::Coordinates;
 use super::local::Order;
 use super::{differentiable, moving_operands, vertex_cut};
-use crate::graph::{Graph, NodeId, Op};
+use crate::graph::{Graph, NodeId};
 
 /// The linear functions of the coordinates in a formula U.
 pub(super) struct LinearPart<'a> {
@@ -22,15 +22,9 @@ impl<'a> LinearPart<'a> {
         for node in differentiable(g, &[output], order) {
             let mut moving = moving_operands(g, node, order);
             moving.retain(|&operand| g.varies(operand));
-            let is_linear = match g.op(node) {
-                Op::Add(..) | Op::Sub(..) | Op::Neg(_) => true,
-                Op::Mul(a, b) => !(g.varies(a) && g.varies(b)),
-                Op::Div(_, divisor) => !g.varies(divisor),
-                _ => false,
-            };
             if coordinates.seeds.contains_key(&node) {
                 part.operands.insert(node, Vec::new());
-            } else if is_linear && moving.iter().all(|operand| part.operands.contains_key(operand)) {
+            } else if g.is_linear(node) && moving.iter().all(|operand| part.operands.contains_key(operand)) {
                 part.operands.insert(node, moving);
             } else {
                 part.front.extend(moving.into_iter().filter(|operand| part.operands.contains_key(operand)));

@@ -209,19 +209,28 @@ impl Graph {
         self.varies[node.0 as usize]
     }
 
-    /// Returns whether all nodes are linear functions of what varies.
+    /// Returns whether the operation of a node is linear in those of its operands that vary.
+    pub(crate) fn is_linear(&self, node: NodeId) -> bool {
+        match self.op(node) {
+            Op::Add(..) | Op::Sub(..) | Op::Neg(_) => true,
+            Op::Mul(a, b) => !(self.varies(a) && self.varies(b)),
+            Op::Div(_, divisor) => !self.varies(divisor),
+            _ => false,
+        }
+    }
+
+    /// Returns whether all nodes are linear functions of the inputs that vary.
     pub(crate) fn are_linear(&self, nodes: &[NodeId]) -> bool {
+        let mut seen = BTreeSet::new();
         let mut stack = nodes.to_vec();
         while let Some(node) = stack.pop() {
-            match self.op(node) {
-                _ if !self.varies(node) => {}
-                Op::Input(_) => {}
-                Op::Neg(a) => stack.push(a),
-                Op::Add(a, b) | Op::Sub(a, b) => stack.extend([a, b]),
-                Op::Mul(a, b) if !(self.varies(a) && self.varies(b)) => stack.extend([a, b]),
-                Op::Div(a, b) if !self.varies(b) => stack.push(a),
-                _ => return false,
+            if !self.varies(node) || !seen.insert(node) || matches!(self.op(node), Op::Input(_)) {
+                continue;
             }
+            if !self.is_linear(node) {
+                return false;
+            }
+            stack.extend(self.op(node).operands());
         }
         true
     }

@@ -187,7 +187,7 @@ impl Listing {
             for (place, route) in routes.list.iter().enumerate() {
                 let why = match place {
                     0 if taken == least => "taken: costs least".to_owned(),
-                    0 => "taken: less by a twentieth would change it".to_owned(),
+                    0 => "taken: none is shorter by a twentieth".to_owned(),
                     _ if route.cost == taken => "as cheap, but listed later".to_owned(),
                     _ => format!("costs {:.2}×", route.cost as f64 / taken as f64),
                 };
