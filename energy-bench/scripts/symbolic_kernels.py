@@ -156,33 +156,28 @@ def sympy_printer():
     return Powers().doprint
 
 
-def sympy_source(name, formula, constants, unknowns, second):
+def sympy_derivatives(formula, constants, unknowns, second):
+    """Returns common subexpressions, then value, gradient and, if asked, the triangle of Hessian blocks by them."""
     import sympy
 
     c, x = sympy.symbols(f"c:{constants}", real=True), sympy.symbols(f"x:{unknowns}", real=True)
     value = formula(sympy, list(c), list(x))
     gradient = [sympy.diff(value, variable) for variable in x]
     outputs = [value] + gradient
-    entries = {}
     if second:
-        for row, column in triangle(unknowns):
-            key = (min(row, column), max(row, column))
-            if key not in entries:
-                entries[key] = sympy.diff(gradient[key[0]], x[key[1]])
-        outputs += [entries[key] for key in sorted(entries)]
-    shared, results = sympy.cse(outputs, symbols=sympy.numbered_symbols("t"), order="none")
+        entries = {(i, j): sympy.diff(gradient[i], x[j]) for i in range(unknowns) for j in range(i, unknowns)}
+        outputs += [entries[min(row, column), max(row, column)] for row, column in triangle(unknowns)]
+    return sympy.cse(outputs, symbols=sympy.numbered_symbols("t"), order="none")
+
+
+def sympy_source(name, derivatives, constants, unknowns, stride=""):
+    """Returns a function in C. Its inputs and results are `stride` apart, as in " * 8"."""
+    shared, results = derivatives
     print_c = sympy_printer()
-    lines = [f"    double c{i} = in[{i}];" for i in range(constants)]
-    lines += [f"    double x{i} = in[{constants + i}];" for i in range(unknowns)]
+    lines = [f"    double c{i} = in[{i}{stride}];" for i in range(constants)]
+    lines += [f"    double x{i} = in[{constants + i}{stride}];" for i in range(unknowns)]
     lines += [f"    double {symbol} = {print_c(expression)};" for symbol, expression in shared]
-    lines += [f"    out[{i}] = {print_c(result)};" for i, result in enumerate(results[: 1 + unknowns])]
-    if second:
-        entry_of = {key: results[1 + unknowns + i] for i, key in enumerate(sorted(entries))}
-        seen = {}
-        for i, (row, column) in enumerate(triangle(unknowns)):
-            key, place = (min(row, column), max(row, column)), 1 + unknowns + i
-            lines.append(f"    out[{place}] = {f'out[{seen[key]}]' if key in seen else print_c(entry_of[key])};")
-            seen.setdefault(key, place)
+    lines += [f"    out[{i}{stride}] = {print_c(result)};" for i, result in enumerate(results)]
     body = "\n".join(lines)
     return f"static inline void {name}_sympy(const double *in, double *out) {{\n{body}\n}}\n"
 
@@ -284,7 +279,7 @@ def build(kernel, tool, folder, options):
     outputs = 1 + unknowns + (len(triangle(unknowns)) if second else 0)
     call, extension, command = f"{name}_{tool}(element, result);", ".c", [options.cc]
     if tool == "sympy":
-        source = sympy_source(name, formula, constants, unknowns, second)
+        source = sympy_source(name, sympy_derivatives(formula, constants, unknowns, second), constants, unknowns)
     elif tool == "casadi":
         source = casadi_source(name, formula, constants, unknowns, second, folder)
         call = f"{name}_casadi(&element, &result, 0, 0, 0);"

@@ -7,6 +7,7 @@ pub mod coincident;
 mod contender;
 pub mod contenders;
 mod dual;
+pub mod formulas;
 pub mod kernels;
 pub mod measure;
 pub mod near_rest;

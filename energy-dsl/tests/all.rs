@@ -20,3 +20,4 @@ mod singular;
 mod ui;
 mod unknowns;
 mod vertex;
+mod weighted_sums;

@@ -85,7 +85,7 @@ fn inputs_of(declaration: &energy_dsl::Declaration, seed: usize) -> [Vec<f64>; 4
 }
 
 /// Compares all blocks of generated code with those of a block tape.
-fn check<E: Element>() {
+pub(crate) fn check<E: Element>() {
     let declaration = E::DECLARATION;
     let tape = Interpreted::from_source(&declaration.source).unwrap().pop().unwrap();
     assert_eq!(tape.declaration().points, declaration.points);

@@ -6,9 +6,9 @@ pub(crate) mod mixed;
 use std::borrow::Cow::Borrowed;
 
 use energy_dsl::{
-    Block, Declaration, Element, Field, FieldKind, Flags, ForceJacobians, ForceLaw, ForceValue, Gradient, Hessian,
-    Inputs, Kind, Lane, Outputs, PackedPotential, Potential, Real, ReducedHessian, ReducedPotential, RestError, Stored,
-    Value, Vector3,
+    Baseline, Block, Declaration, Element, Field, FieldKind, Flags, ForceJacobians, ForceLaw, ForceValue, Gradient,
+    Hessian, Inputs, Kind, Lane, Level, Outputs, PackedPotential, Potential, Real, ReducedHessian, ReducedPotential,
+    RestError, Stored, Value, Vector3,
 };
 
 const fn declaration(
@@ -105,7 +105,7 @@ impl<T: Real, const SLACK: bool> Potential<T> for AnySpring<T, SLACK> {
     }
 
     fn hessian(&self, x: &Self::Points) -> Hessian<T, Self::Points, Self::Triangle> {
-        Self::expand::<{ u32::MAX }>(&self.reduced_hessian(x))
+        Self::expand::<Baseline, { u32::MAX }>(&self.reduced_hessian(x))
     }
 }
 
@@ -125,7 +125,7 @@ impl<T: Real, const SLACK: bool> ReducedPotential<T> for AnySpring<T, SLACK> {
         ReducedHessian { value, gradient: gradient[0], hessian, flags }
     }
 
-    fn expand<const FREE: u32>(
+    fn expand<L: Level, const FREE: u32>(
         reduced: &ReducedHessian<T, [T; 3], [T; 6]>,
     ) -> Hessian<T, Self::Points, Self::Triangle> {
         let [xx, xy, xz, yy, yz, zz] = reduced.hessian;

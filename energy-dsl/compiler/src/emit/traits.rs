@@ -44,7 +44,7 @@ fn potential(emitter: &Emitter<'_>) -> TokenStream {
 
         #[inline(always)]
         fn hessian_at<L: ::energy_dsl::Level>(&self, x: &#points) -> ::energy_dsl::Hessian<T, #points, #triangle> {
-            <Self as ::energy_dsl::ReducedPotential<T>>::expand::<{ u32::MAX }>(
+            <Self as ::energy_dsl::ReducedPotential<T>>::expand::<L, { u32::MAX }>(
                 &<Self as ::energy_dsl::ReducedPotential<T>>::reduced_hessian_at::<L>(self, x),
             )
         }
@@ -89,7 +89,7 @@ fn reduced_potential(emitter: &Emitter<'_>) -> TokenStream {
         type Upper = #upper;
 
         #[inline(always)]
-        fn expand<const FREE: u32>(
+        fn expand<L: ::energy_dsl::Level, const FREE: u32>(
             reduced: &::energy_dsl::ReducedHessian<T, #coordinates, #upper>,
         ) -> ::energy_dsl::Hessian<T, #points, #triangle> {
             #statements

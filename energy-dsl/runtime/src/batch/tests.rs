@@ -95,7 +95,9 @@ impl<T: Real> ReducedPotential<T> for Spring<T> {
         unreachable!("batches do not use it")
     }
 
-    fn expand<const FREE: u32>(_: &ReducedHessian<T, [T; 3], [T; 6]>) -> Hessian<T, Self::Points, Self::Triangle> {
+    fn expand<L: Level, const FREE: u32>(
+        _: &ReducedHessian<T, [T; 3], [T; 6]>,
+    ) -> Hessian<T, Self::Points, Self::Triangle> {
         unreachable!("batches do not use it")
     }
 }

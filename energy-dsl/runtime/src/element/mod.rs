@@ -208,15 +208,15 @@ pub trait ReducedPotential<T: Real>: Potential<T> {
     fn reduced_hessian_at<L: Level>(&self, x: &Self::Points) -> ReducedHessian<T, Self::Coordinates, Self::Upper> {
         self.reduced_hessian(x)
     }
-    /// Expands reduced derivatives to points: signed sums of the reduced ones. Bit i of `FREE` marks point i as free;
+    /// Expands reduced derivatives to points: weighted sums of the reduced ones. Bit i of `FREE` marks point i as free;
     /// blocks of other points are 0 and cost nothing.
-    fn expand<const FREE: u32>(
+    fn expand<L: Level, const FREE: u32>(
         reduced: &ReducedHessian<T, Self::Coordinates, Self::Upper>,
     ) -> Hessian<T, Self::Points, Self::Triangle>;
     /// [`Potential::hessian_at`] with blocks of free points only. Bit i of `FREE` marks point i as free.
     #[inline(always)]
     fn hessian_free_at<L: Level, const FREE: u32>(&self, x: &Self::Points) -> Hessian<T, Self::Points, Self::Triangle> {
-        Self::expand::<FREE>(&self.reduced_hessian_at::<L>(x))
+        Self::expand::<L, FREE>(&self.reduced_hessian_at::<L>(x))
     }
 }
 

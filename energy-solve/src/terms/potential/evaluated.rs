@@ -193,7 +193,7 @@ impl<E: PackedPotential<f64>, V: Lane<f64>> Kernel for Expansion<'_, '_, '_, E, 
     #[inline(always)]
     fn run<L: Level>(self) {
         let Self { to, lanes, reduced, changed } = self;
-        let mut result = <E::Wide<V> as ReducedPotential<V>>::expand::<{ u32::MAX }>(reduced);
+        let mut result = <E::Wide<V> as ReducedPotential<V>>::expand::<L, { u32::MAX }>(reduced);
         let flagged = lanes_in(result.flags.degenerate | result.flags.kink, lanes.count);
         V::dispatch(Addition {
             to,
