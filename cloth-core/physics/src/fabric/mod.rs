@@ -7,6 +7,7 @@ mod description;
 mod error;
 mod hair;
 mod library;
+mod lists;
 mod locking;
 mod membrane;
 mod nodal;

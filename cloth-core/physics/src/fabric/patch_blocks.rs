@@ -3,50 +3,75 @@
 use energy_dsl::{Block, Level};
 use energy_solve::{DofMap, Pattern, Precision, Restriction, Storage, index};
 
-/// Slots of the blocks of a patch: of the pairs i ≤ j, and of the mirrored pairs if the matrix stores both triangles.
-#[derive(Clone, Debug)]
+use super::lists::Lists;
+
+/// Slots of the blocks of patches: of the pairs i ≤ j, and of the mirrored pairs if the matrix stores both triangles.
+#[derive(Clone, Debug, Default)]
 pub(super) struct PatchSlots {
-    /// The number of vertices of the patch.
-    pub vertices: usize,
-    slots: Vec<u32>,
-    mirrored: Vec<u32>,
+    slots: Lists<u32>,
+    mirrored: Lists<u32>,
 }
 
 impl PatchSlots {
-    /// Looks up the blocks of a patch, whose vertices ascend.
-    pub fn new(vertices: &[usize], dofs: &DofMap, pattern: &Pattern) -> Self {
-        let slot = |i: usize, j: usize| {
+    /// Looks up the blocks of patches, whose vertices ascend.
+    pub fn new<'a>(patches: impl Iterator<Item = &'a [usize]> + Clone, dofs: &DofMap, pattern: &Pattern) -> Self {
+        let slot = |(i, j): (usize, usize)| {
             let rows = dofs.row(i).zip(dofs.row(j));
             index(rows.and_then(|(row, column)| pattern.slot(row, column)).map_or(pattern.nowhere(), |(slot, _)| slot))
         };
-        let pairs = || (0..vertices.len()).flat_map(|i| (i..vertices.len()).map(move |j| (vertices[i], vertices[j])));
+        let is_mirrored = pattern.storage() == Storage::Whole;
+        let mirrored = |&(i, j): &(usize, usize)| is_mirrored && i != j;
         // Vertices ascend, and so do their rows: no block of the upper triangle needs transposing.
         Self {
-            vertices: vertices.len(),
-            slots: pairs().map(|(i, j)| slot(i, j)).collect(),
-            mirrored: match pattern.storage() {
-                Storage::Upper => Vec::new(),
-                Storage::Whole => pairs().filter(|(i, j)| i != j).map(|(i, j)| slot(j, i)).collect(),
-            },
+            slots: patches.clone().map(|patch| pairs(patch).map(slot)).collect(),
+            mirrored: patches.map(|patch| pairs(patch).filter(mirrored).map(|(i, j)| slot((j, i)))).collect(),
         }
     }
 
-    /// Returns the slots in a restricted matrix.
-    pub fn restricted(&self, restriction: &Restriction<'_>) -> Self {
-        let slots = |slots: &[u32]| slots.iter().map(|&slot| restriction.slot(slot)).collect();
-        Self { vertices: self.vertices, slots: slots(&self.slots), mirrored: slots(&self.mirrored) }
+    /// Returns the slots of these patches in a restricted matrix.
+    pub fn restricted(&self, patches: &[usize], restriction: &Restriction<'_>) -> Self {
+        let of = |slots: &Lists<u32>| {
+            patches.iter().map(|&patch| slots.get(patch).iter().map(|&slot| restriction.slot(slot))).collect()
+        };
+        Self { slots: of(&self.slots), mirrored: of(&self.mirrored) }
+    }
+
+    /// Returns the slots of one patch.
+    #[inline(always)]
+    pub fn get(&self, patch: usize) -> Slots<'_> {
+        Slots { slots: self.slots.get(patch), mirrored: self.mirrored.get(patch) }
+    }
+}
+
+/// Returns the pairs i ≤ j of vertices.
+fn pairs(vertices: &[usize]) -> impl Iterator<Item = (usize, usize)> {
+    vertices.iter().enumerate().flat_map(move |(i, &first)| vertices[i..].iter().map(move |&second| (first, second)))
+}
+
+/// Slots of the blocks of one patch.
+#[derive(Clone, Copy)]
+pub(super) struct Slots<'a> {
+    slots: &'a [u32],
+    mirrored: &'a [u32],
+}
+
+impl Slots<'_> {
+    /// Returns the number of pairs i ≤ j.
+    #[inline(always)]
+    pub fn pairs(self) -> usize {
+        self.slots.len()
     }
 
     /// Adds s Σ aᵢₖ bⱼₖᵀ + m 1 to the block of each pair, given the rows a and b of the vertices and, by pairs i ≤ j, the
     /// multiples m of the identity; no multiples stand for zeros.
     #[inline(always)]
     pub fn add<L: Level, T: Precision>(
-        &self,
+        self,
         (s, a, b): (T, &[Row<T>], &[Right<T>]),
         multiples: Option<&[T]>,
         to: &mut BlocksFrom<'_, T>,
     ) {
-        let (mut slots, mut left) = (&self.slots[..], multiples);
+        let (mut slots, mut left) = (self.slots, multiples);
         // LLVM would break registers into their entries, if it knew the zeros.
         let (zero, one) = (T::from_f64(0.0), T::from_f64(1.0));
         let diagonal = std::hint::black_box([one, zero, zero, zero, one, zero, zero, zero]);
@@ -63,7 +88,7 @@ impl PatchSlots {
         }
         // The mirrored block is the transposed one.
         let pairs = (0..a.len()).flat_map(|i| (i..a.len()).map(move |j| (i, j))).enumerate();
-        for ((pair, (i, j)), &slot) in pairs.filter(|(_, (i, j))| i != j).zip(&self.mirrored) {
+        for ((pair, (i, j)), &slot) in pairs.filter(|(_, (i, j))| i != j).zip(self.mirrored) {
             if let Some(block) = to.block(slot) {
                 let mut added = [[T::from_f64(0.0); 3]; 3];
                 let multiple = multiples.map(|all| (all[pair], &diagonal));

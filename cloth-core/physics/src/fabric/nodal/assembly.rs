@@ -24,7 +24,7 @@ impl Kernel for Strains<'_> {
     fn run<L: Level>(self) -> Vec<Strain> {
         let mut strains = vec![[0.0; 3]; self.patches.len()];
         for (strain, &patch) in strains.iter_mut().zip(self.patches) {
-            *strain = self.of.patches[patch].strain(self.x);
+            *strain = self.of.patches.get(patch).strain(self.x);
         }
         strains
     }
@@ -56,10 +56,10 @@ impl Kernel for Forces<'_> {
         let Self { of, found, x, mut force } = self;
         let mut rows = Vec::new();
         for (number, response) in found {
-            let patch = &of.patches[of.active[*number]];
+            let patch = of.patches.get(of.active[*number]);
             rows.clear();
             patch.append_gradients(x, &mut rows);
-            subtract_gradient(&rows, &patch.vertices, &response.stress, &mut force);
+            subtract_gradient(&rows, patch.vertices, &response.stress, &mut force);
         }
     }
 }
@@ -99,15 +99,15 @@ impl<T: Precision> Kernel for Hessians<'_, T> {
         for group in found.chunks(GROUP) {
             rows.clear();
             multiples.clear();
-            group.iter().for_each(|(number, _)| of.patches[of.active[*number]].append_gradients(x, &mut rows));
+            group.iter().for_each(|(number, _)| of.patches.get(of.active[*number]).append_gradients(x, &mut rows));
             lefts.resize(rows.len(), [[T::from_f64(0.0); 4]; 3]);
             rights.resize(rows.len(), Right::zeros());
             let mut first = 0;
             for (number, response) in group {
-                let patch = &of.patches[of.active[*number]];
+                let patch = of.patches.get(of.active[*number]);
                 let own = first..first + patch.vertices.len();
                 first = own.end;
-                subtract_gradient(&rows[own.clone()], &patch.vertices, &response.stress, &mut force);
+                subtract_gradient(&rows[own.clone()], patch.vertices, &response.stress, &mut force);
                 let (moduli, stress) = match curvature {
                     Curvature::Exact => (response.moduli, response.stress),
                     _ => changed(response, curvature),
@@ -123,10 +123,10 @@ impl<T: Precision> Kernel for Hessians<'_, T> {
             }
             let (mut first, mut multiples) = (0, &multiples[..]);
             for (number, _) in group {
-                let slots = &of.slots[*number];
-                let own = first..first + slots.vertices;
+                let slots = of.slots.get(*number);
+                let (of_pairs, of_others) = multiples.split_at(slots.pairs());
+                let own = first..first + of.patches.get(of.active[*number]).vertices.len();
                 first = own.end;
-                let (of_pairs, of_others) = multiples.split_at(slots.vertices * (slots.vertices + 1) / 2);
                 let factors = (T::from_f64(scale), &lefts[own.clone()], &rights[own]);
                 slots.add::<L, T>(factors, Some(of_pairs), &mut to);
                 multiples = of_others;
@@ -175,16 +175,16 @@ fn is_definite(&[[a, b, c], [_, d, e], [_, _, f]]: &[[f64; 3]; 3]) -> bool {
 pub(super) fn subtract_product(of: &NodalMembrane, found: &[Found], state: State<'_>, mut product: Sums<'_>) {
     let mut rows = Vec::new();
     for (number, response) in found {
-        let patch = &of.patches[of.active[*number]];
+        let patch = of.patches.get(of.active[*number]);
         rows.clear();
         patch.append_gradients(state.x, &mut rows);
         let moved = |(row, &vertex): (&Row<f64>, &usize)| row.map(|[x, y, z, _]| dot([x, y, z], state.v[vertex]));
-        let rates = rows.iter().zip(&patch.vertices).map(moved);
+        let rates = rows.iter().zip(patch.vertices).map(moved);
         let rate = rates.fold([0.0; 3], |sum: [f64; 3], one| std::array::from_fn(|k| sum[k] + one[k]));
-        subtract_gradient(&rows, &patch.vertices, &response.moduli.map(|row| dot(row, rate)), &mut product);
+        subtract_gradient(&rows, patch.vertices, &response.moduli.map(|row| dot(row, rate)), &mut product);
         // The second part has the form of a gradient, at the velocities.
         rows.clear();
         patch.append_gradients(state.v, &mut rows);
-        subtract_gradient(&rows, &patch.vertices, &response.stress, &mut product);
+        subtract_gradient(&rows, patch.vertices, &response.stress, &mut product);
     }
 }

@@ -14,7 +14,7 @@ impl NodalMembrane {
     /// Returns the chunks with a patch at one of these vertices.
     pub(super) fn chunks_at(&self, vertices: &Range<usize>) -> Vec<usize> {
         let has_patch =
-            |chunk: &Chunk| self.active[chunk.numbers.clone()].iter().any(|&p| meets(&self.patches[p], vertices));
+            |chunk: &Chunk| self.active[chunk.numbers.clone()].iter().any(|&p| meets(self.patches.get(p), vertices));
         (0..self.chunks.len()).filter(|&number| has_patch(&self.chunks[number])).collect()
     }
 
@@ -26,8 +26,9 @@ impl NodalMembrane {
             let chunk = &self.chunks[number];
             let (responses, flagged) = self.responses(chunk, x, order);
             let found = chunk.numbers.clone().zip(responses);
-            all.extend(found.filter(|&(number, _)| meets(&self.patches[self.active[number]], &share.vertices)));
-            let begins_here = share.vertices.contains(&self.patches[self.active[chunk.numbers.start]].vertices[0]);
+            all.extend(found.filter(|&(number, _)| meets(self.patches.get(self.active[number]), &share.vertices)));
+            let first = self.patches.get(self.active[chunk.numbers.start]).vertices[0];
+            let begins_here = share.vertices.contains(&first);
             total += if begins_here { flagged } else { 0 };
         }
         (all, total)
@@ -41,8 +42,8 @@ impl NodalMembrane {
 }
 
 /// Whether a patch may have one of these vertices.
-fn meets(patch: &Patch, vertices: &Range<usize>) -> bool {
-    let [first, .., last] = patch.vertices[..] else { return false };
+fn meets(patch: Patch<'_>, vertices: &Range<usize>) -> bool {
+    let [first, .., last] = *patch.vertices else { return false };
     first < vertices.end && last >= vertices.start
 }
 

@@ -11,7 +11,7 @@ use energy_solve::{
 use super::assembly::Strains;
 use super::fan::{Fan, fans};
 use super::law::{Order, Response, StrainLaw, TriangleLaw, total_energy};
-use super::patch::Patch;
+use super::patch::Patches;
 use crate::fabric::patch_blocks::{PatchSlots, padded_stencils};
 use crate::fabric::plasticity::flowed;
 use crate::geometry::dot;
@@ -32,13 +32,13 @@ pub(in super::super) struct NodalMembrane {
     pub(super) chunks: Vec<Chunk>,
     /// C_v, which plain triangles carry.
     plain: Vec<Moduli>,
-    pub(super) patches: Vec<Patch>,
+    pub(super) patches: Patches,
     /// Vertices of the patches, padded to the same number by repeating the first.
     stencils: Vec<u32>,
     arity: usize,
     /// Patches with a free vertex, and the slots of their blocks; set by [`Term::place`].
     pub(super) active: Vec<usize>,
-    pub(super) slots: Vec<PatchSlots>,
+    pub(super) slots: PatchSlots,
     /// How rest shapes yield; `None` if they do not.
     flow: Option<Flow>,
     /// The chunks with a patch at a vertex of each share; set by [`PlacedTerm::divide`].
@@ -132,11 +132,10 @@ impl NodalMembrane {
     ) -> Result<Self, RestError> {
         let law: LawOfAreas = Box::new(move |areas| Ok(Box::new(TriangleLaw::new(areas, &element)?)));
         let RestShapes { mesh, rest, fans } = shapes;
-        let patch = |fan: &Fan| Patch::new(fan, mesh.triangles(), rest).on_vertices_from(first);
-        let patches: Vec<Patch> = fans.iter().map(patch).collect();
+        let patches = Patches::new(&fans, mesh.triangles(), rest, first);
         let triangles = mesh.triangles().iter().map(|corners| corners.map(|vertex| first + vertex)).collect();
-        let areas: Vec<f64> = patches.iter().map(|patch| patch.area).collect();
-        let (stencils, arity) = padded_stencils(patches.iter().map(|patch| &patch.vertices[..]));
+        let areas: Vec<f64> = (0..patches.len()).map(|patch| patches.area(patch)).collect();
+        let (stencils, arity) = padded_stencils(patches.vertices());
         let of_all = law(&areas)?;
         Ok(Self {
             name,
@@ -147,7 +146,7 @@ impl NodalMembrane {
             arity,
             plain,
             active: Vec::new(),
-            slots: Vec::new(),
+            slots: PatchSlots::default(),
             patches,
             flow: limit.map(|limit| Flow { triangles, rest: rest.to_vec(), fans, law, limit }),
         })
@@ -166,7 +165,7 @@ impl NodalMembrane {
         let (mut all, flagged) = chunk.law.respond(&strains, order);
         for ((response, strain), &patch) in all.iter_mut().zip(&strains).zip(patches) {
             for i in 0..3 {
-                let moduli = self.plain[patch][i].map(|entry| self.patches[patch].area * entry);
+                let moduli = self.plain[patch][i].map(|entry| self.patches.area(patch) * entry);
                 let stress = dot(moduli, *strain);
                 response.energy -= 0.5 * stress * strain[i];
                 response.stress[i] -= stress;
@@ -201,12 +200,10 @@ impl NodalMembrane {
     /// Takes the rest shapes of the flow.
     fn fit(&mut self) {
         let Some(flow) = &self.flow else { return };
-        for (patch, fan) in self.patches.iter_mut().zip(&flow.fans) {
-            patch.fit(fan, &flow.rest);
-        }
+        self.patches.fit(&flow.fans, &flow.rest);
         for chunk in &mut self.chunks {
             let patches = self.active[chunk.numbers.clone()].iter();
-            let areas: Vec<f64> = patches.map(|&patch| self.patches[patch].area).collect();
+            let areas: Vec<f64> = patches.map(|&patch| self.patches.area(patch)).collect();
             // Rest shapes that the elements refuse are not taken.
             if let Ok(law) = (flow.law)(&areas) {
                 chunk.law = law;
@@ -242,13 +239,13 @@ impl Term for NodalMembrane {
     fn place(mut self: Box<Self>, dofs: &DofMap, pattern: &Pattern) -> Box<dyn PlacedTerm> {
         let is_free = |&vertex: &usize| dofs.row(vertex).is_some();
         self.active =
-            (0..self.patches.len()).filter(|&patch| self.patches[patch].vertices.iter().any(is_free)).collect();
+            (0..self.patches.len()).filter(|&patch| self.patches.get(patch).vertices.iter().any(is_free)).collect();
         let starts = (0..self.active.len()).step_by(CHUNK);
         let chunks = starts.map(|start| start..(start + CHUNK).min(self.active.len()));
         let all = &self.chunks[0].law;
         self.chunks = chunks.map(|numbers| Chunk::new(numbers.clone(), all.selected(&self.active[numbers]))).collect();
-        let slots = |&patch: &usize| PatchSlots::new(&self.patches[patch].vertices, dofs, pattern);
-        self.slots = self.active.iter().map(slots).collect();
+        let vertices = self.active.iter().map(|&patch| self.patches.get(patch).vertices);
+        self.slots = PatchSlots::new(vertices, dofs, pattern);
         self
     }
 }
@@ -264,11 +261,11 @@ impl PlacedTerm for NodalMembrane {
             chunks: self.chunks_of(&numbers),
             shares: Vec::new(),
             plain: chosen().map(|patch| self.plain[patch]).collect(),
-            patches: chosen().map(|patch| self.patches[patch].clone()).collect(),
+            patches: self.patches.selected(chosen()),
             stencils: chosen().flat_map(|patch| of.stencil(patch)).collect(),
             arity: self.arity,
             active: (0..numbers.len()).collect(),
-            slots: numbers.iter().map(|&number| self.slots[number].restricted(restriction)).collect(),
+            slots: self.slots.restricted(&numbers, restriction),
             flow: None,
         }))
     }

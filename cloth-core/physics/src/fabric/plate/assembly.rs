@@ -4,6 +4,7 @@ use energy_dsl::{BLOCK, Batch, BatchWork, Block, Kernel, Lane, Level, Potential,
 use energy_elements::ArcAngle;
 use energy_solve::{Linearisation, Precision, TriangleBuffer};
 
+use super::patch::append_gradients;
 use super::term::{Angles, PlateTerm};
 use crate::fabric::patch_blocks::{BlocksFrom, GROUP, Right, Row, converted};
 
@@ -92,11 +93,11 @@ impl Kernel for Energies<'_> {
     fn run<L: Level>(self) -> Vec<f64> {
         let Self { of, angles, mut moments } = self;
         let mut energies = vec![0.0; of.active.len()];
-        for (energy, &patch) in energies.iter_mut().zip(&of.active) {
-            let (found, [x, y, z]) = of.response::<L>(patch, angles);
+        for (number, energy) in energies.iter_mut().enumerate() {
+            let (found, [x, y, z]) = of.response::<L>(number, angles);
             *energy = found;
             let Some(moments) = &mut moments else { continue };
-            for angle in &of.patches[patch].angles {
+            for angle in of.angles.get(number) {
                 moments[angle.hinge()] += angle.b[0] * x + angle.b[1] * y + angle.b[2] * z;
             }
         }
@@ -125,10 +126,11 @@ impl<T: Precision> Kernel for OuterProducts<'_, T> {
         }
         let mut to = BlocksFrom { first: 0, blocks: matrix };
         let (mut rows, mut rights): (Vec<Row<T>>, Vec<Right<T>>) = (Vec::new(), Vec::new());
-        for (patches, patch_slots) in of.active.chunks(GROUP).zip(of.patch_slots.chunks(GROUP)) {
+        for first in (0..of.active.len()).step_by(GROUP) {
+            let group = first..(first + GROUP).min(of.active.len());
             rows.clear();
-            for &patch in patches {
-                of.patches[patch].append_gradients::<L, T>(&gradients, &mut rows);
+            for number in group.clone() {
+                append_gradients::<L, T>(of.angles.get(number), of.vertices.get(number).len(), &gradients, &mut rows);
             }
             // Written in place: pushes would spill the registers.
             rights.resize(rows.len(), Right::zeros());
@@ -137,10 +139,10 @@ impl<T: Precision> Kernel for OuterProducts<'_, T> {
                 *std::hint::black_box(right) = Right::of(row);
             }
             let mut first = 0;
-            for patch_slots in patch_slots {
-                let own = first..first + patch_slots.vertices;
+            for number in group {
+                let own = first..first + of.vertices.get(number).len();
                 first = own.end;
-                patch_slots.add::<L, T>((s, &rows[own.clone()], &rights[own]), None, &mut to);
+                of.patch_slots.get(number).add::<L, T>((s, &rows[own.clone()], &rights[own]), None, &mut to);
             }
         }
     }

@@ -21,7 +21,7 @@ pub(super) struct Patch {
     unreached: Vec<[f64; 3]>,
 }
 
-/// A hinge in a patch. Sums over patches wait for these numbers: two hinges share a cache line.
+/// A hinge in a patch. Two hinges share a cache line.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Angle {
     pub b: [f64; 3],
@@ -33,6 +33,11 @@ impl Angle {
     #[inline(always)]
     pub fn hinge(&self) -> usize {
         self.hinge as usize
+    }
+
+    /// Returns the same, given the new indices of hinges.
+    pub fn renumbered(self, new_index: &[usize]) -> Self {
+        Self { hinge: index(new_index[self.hinge()]), ..self }
     }
 }
 
@@ -87,42 +92,40 @@ impl Patch {
         let elastic = std::array::from_fn(|i| std::array::from_fn(|j| entry(i, j)));
         [elastic, [0, 1, 2].map(|k| forward_substituted(&c, columns.map(|column| column[k])))]
     }
+}
 
-    /// Returns the same patch, whose hinges have new indices.
-    pub fn renumbered(&self, new_index: &[usize]) -> Self {
-        let angles =
-            self.angles.iter().map(|angle| Angle { hinge: index(new_index[angle.hinge()]), ..*angle }).collect();
-        Self { vertices: self.vertices.clone(), angles, area: self.area, unreached: Vec::new() }
-    }
-
-    /// Returns r = Σ b (θ − θ̄).
-    #[inline(always)]
-    pub fn residual<L: Level>(&self, values: &[f64]) -> [f64; 3] {
-        let mut r = [0.0; 3];
-        for angle in &self.angles {
-            let value = values[angle.hinge()];
-            for k in 0..3 {
-                r[k] = Number::mul_add::<L>(angle.b[k], value, r[k]);
-            }
+/// Returns r = Σ b (θ − θ̄) of a patch with these hinges.
+#[inline(always)]
+pub(super) fn residual<L: Level>(angles: &[Angle], values: &[f64]) -> [f64; 3] {
+    let mut r = [0.0; 3];
+    for angle in angles {
+        let value = values[angle.hinge()];
+        for k in 0..3 {
+            r[k] = Number::mul_add::<L>(angle.b[k], value, r[k]);
         }
-        r
     }
+    r
+}
 
-    /// Appends ∇r: three vectors per vertex.
-    #[inline(always)]
-    pub fn append_gradients<L: Level, T: Precision>(&self, gradients: &[[[T; 4]; 4]], all: &mut Vec<Row<T>>) {
-        let first = all.len();
-        all.resize(first + self.vertices.len(), [[T::from_f64(0.0); 4]; 3]);
-        let rows = &mut all[first..];
-        for angle in &self.angles {
-            let gradient = &gradients[angle.hinge()];
-            let b = [T::from_f64(angle.b[0]), T::from_f64(angle.b[1]), T::from_f64(angle.b[2])];
-            for point in 0..4 {
-                let row = &mut rows[angle.local[point] as usize];
-                for k in 0..3 {
-                    for axis in 0..4 {
-                        row[k][axis] = b[k].mul_add::<L>(gradient[point][axis], row[k][axis]);
-                    }
+/// Appends ∇r of a patch with these hinges: three vectors per vertex.
+#[inline(always)]
+pub(super) fn append_gradients<L: Level, T: Precision>(
+    angles: &[Angle],
+    vertices: usize,
+    gradients: &[[[T; 4]; 4]],
+    all: &mut Vec<Row<T>>,
+) {
+    let first = all.len();
+    all.resize(first + vertices, [[T::from_f64(0.0); 4]; 3]);
+    let rows = &mut all[first..];
+    for angle in angles {
+        let gradient = &gradients[angle.hinge()];
+        let b = [T::from_f64(angle.b[0]), T::from_f64(angle.b[1]), T::from_f64(angle.b[2])];
+        for point in 0..4 {
+            let row = &mut rows[angle.local[point] as usize];
+            for k in 0..3 {
+                for axis in 0..4 {
+                    row[k][axis] = b[k].mul_add::<L>(gradient[point][axis], row[k][axis]);
                 }
             }
         }

@@ -12,9 +12,10 @@ use energy_solve::{
 
 use super::assembly::{CurvedPart, Energies, OuterProducts};
 use super::friction::Friction;
-use super::patch::{Angle, Matrix, Patch};
+use super::patch::{Angle, Matrix, Patch, append_gradients, residual};
 use super::rigidity::cholesky;
 use super::{Rigidity, RigidityError, ThreadError, curvatures};
+use crate::fabric::lists::Lists;
 use crate::fabric::patch_blocks::{PatchSlots, Row, padded_stencils};
 use crate::fabric::plasticity::{angle_of_curvature, flow};
 use crate::geometry::dot;
@@ -36,15 +37,17 @@ pub struct PlateTerm {
     limits: Option<Vec<f64>>,
     /// L of the rigidity D = L Lᵀ.
     factor: Matrix,
-    pub(super) patches: Vec<Patch>,
+    patches: Vec<Patch>,
     /// How each patch yields; empty if they do not.
     frictions: Vec<Friction>,
     /// Vertices of the patches, padded to the same number by repeating the first.
     stencils: Vec<u32>,
     arity: usize,
-    /// Patches with a free vertex, and the slots of their blocks; set by [`Term::place`].
+    /// Patches with a free vertex, their hinges, vertices and the slots of their blocks; set by [`Term::place`].
     pub(super) active: Vec<usize>,
-    pub(super) patch_slots: Vec<PatchSlots>,
+    pub(super) angles: Lists<Angle>,
+    pub(super) vertices: Lists<usize>,
+    pub(super) patch_slots: PatchSlots,
     /// Hinges that active patches need; the same, packed; and the slots of their blocks.
     pub(super) needed: Vec<usize>,
     packed: Packed<ArcAngle>,
@@ -106,7 +109,9 @@ impl PlateTerm {
             stencils,
             arity,
             active: Vec::new(),
-            patch_slots: Vec::new(),
+            angles: Lists::default(),
+            vertices: Lists::default(),
+            patch_slots: PatchSlots::default(),
             needed: Vec::new(),
             packed: Packed::new::<4>(&[], &[]),
             hinge_slots: ScatterMaps::default(),
@@ -175,7 +180,7 @@ impl PlateTerm {
 
     fn tally(&self, flagged: u64) -> Tally {
         let evaluated = self.active.len() as u64;
-        Tally { evaluated, skipped: self.patches.len() as u64 - evaluated, flagged, projected: 0 }
+        Tally { evaluated, skipped: self.stencils().len() as u64 - evaluated, flagged, projected: 0 }
     }
 
     /// Evaluates θ − θ̄ of all needed hinges.
@@ -186,11 +191,11 @@ impl PlateTerm {
         values
     }
 
-    /// Returns the energy of a patch and its derivative by r, from the angles θ − θ̄ of all hinges.
+    /// Returns the energy of an active patch and its derivative by r, from the angles θ − θ̄ of all hinges.
     #[inline(always)]
-    pub(super) fn response<L: Level>(&self, patch: usize, angles: &[f64]) -> (f64, [f64; 3]) {
-        let r = self.patches[patch].residual::<L>(angles);
-        self.frictions.get(patch).map_or_else(|| (0.5 * dot(r, r), r), |friction| friction.response(r))
+    pub(super) fn response<L: Level>(&self, number: usize, angles: &[f64]) -> (f64, [f64; 3]) {
+        let r = residual::<L>(self.angles.get(number), angles);
+        self.frictions.get(self.active[number]).map_or_else(|| (0.5 * dot(r, r), r), |friction| friction.response(r))
     }
 
     /// Returns the energy of each patch with a free vertex.
@@ -310,8 +315,10 @@ impl Term for PlateTerm {
         let is_free = |&vertex: &usize| dofs.row(vertex).is_some();
         self.active =
             (0..self.patches.len()).filter(|&patch| self.patches[patch].vertices.iter().any(is_free)).collect();
-        let mut needed: Vec<usize> =
-            self.active.iter().flat_map(|&patch| self.patches[patch].angles.iter().map(Angle::hinge)).collect();
+        let active = || self.active.iter().map(|&patch| &self.patches[patch]);
+        self.angles = active().map(|patch| patch.angles.iter().copied()).collect();
+        self.vertices = active().map(|patch| patch.vertices.iter().copied()).collect();
+        let mut needed: Vec<usize> = self.angles.items().iter().map(Angle::hinge).collect();
         needed.sort_unstable();
         needed.dedup();
         let element = ArcAngle::new();
@@ -320,8 +327,7 @@ impl Term for PlateTerm {
         self.needed = needed;
         let vertices: Vec<u32> = self.needed.iter().flat_map(|&hinge| self.hinges[hinge].map(index)).collect();
         self.hinge_slots = ScatterMaps::of_all(Stencils::new(4, &vertices), dofs, pattern);
-        let slots = |&patch: &usize| PatchSlots::new(&self.patches[patch].vertices, dofs, pattern);
-        self.patch_slots = self.active.iter().map(slots).collect();
+        self.patch_slots = PatchSlots::new(self.vertices.iter(), dofs, pattern);
         self
     }
 }
@@ -331,10 +337,10 @@ impl PlacedTerm for PlateTerm {
     /// then take as long as the restricted term is large.
     fn restricted(&self, restriction: &Restriction<'_>) -> Option<Box<dyn PlacedTerm>> {
         let numbers = restriction.remaining(self.active.iter().copied(), self.stencils());
-        let patches: Vec<&Patch> = numbers.iter().map(|&number| &self.patches[self.active[number]]).collect();
         let stencil = |&number: &usize| self.stencils().stencil(self.active[number]);
         let mut is_needed = vec![false; self.hinges.len()];
-        patches.iter().flat_map(|patch| &patch.angles).for_each(|angle| is_needed[angle.hinge()] = true);
+        let angles = || numbers.iter().map(|&number| self.angles.get(number).iter());
+        angles().flatten().for_each(|angle| is_needed[angle.hinge()] = true);
         let kept: Vec<usize> = (0..self.needed.len()).filter(|&number| is_needed[self.needed[number]]).collect();
         let hinges: Vec<usize> = kept.iter().map(|&number| self.needed[number]).collect();
         let mut new_index = vec![0; self.hinges.len()];
@@ -346,11 +352,13 @@ impl PlacedTerm for PlateTerm {
             limits: None,
             factor: self.factor,
             frictions: numbers.iter().filter_map(|&number| self.frictions.get(self.active[number]).copied()).collect(),
-            patches: patches.iter().map(|patch| patch.renumbered(&new_index)).collect(),
+            patches: Vec::new(),
             stencils: numbers.iter().flat_map(stencil).collect(),
             arity: self.arity,
             active: (0..numbers.len()).collect(),
-            patch_slots: numbers.iter().map(|&number| self.patch_slots[number].restricted(restriction)).collect(),
+            angles: angles().map(|angles| angles.map(|angle| angle.renumbered(&new_index))).collect(),
+            vertices: numbers.iter().map(|&number| self.vertices.get(number).iter().copied()).collect(),
+            patch_slots: self.patch_slots.restricted(&numbers, restriction),
             needed: (0..hinges.len()).collect(),
             packed: self.packed.selected(&kept),
             hinge_slots: self.hinge_slots.restricted(&kept, restriction),
@@ -377,9 +385,9 @@ impl PlacedTerm for PlateTerm {
         }
         if !self.frictions.is_empty() {
             let angles = self.values(end.x).angles;
-            self.active
-                .iter()
-                .for_each(|&patch| self.frictions[patch].flow(self.patches[patch].residual::<Baseline>(&angles)));
+            for (&patch, own) in self.active.iter().zip(self.angles.iter()) {
+                self.frictions[patch].flow(residual::<Baseline>(own, &angles));
+            }
         }
     }
 
@@ -435,13 +443,12 @@ impl PlacedTerm for PlateTerm {
 
     fn find_non_finite(&self, _: Quantity, state: State<'_>) -> Option<usize> {
         let angles = self.angles(state.x);
-        let is_finite = |patch: &Patch| {
+        let is_finite = |own: &[Angle]| {
             let finite =
                 |angle: &Angle| angles.gradients[angle.hinge()].as_flattened().iter().all(|number| number.is_finite());
-            patch.residual::<Baseline>(&angles.values).iter().all(|number| number.is_finite())
-                && patch.angles.iter().all(finite)
+            residual::<Baseline>(own, &angles.values).iter().all(|number| number.is_finite()) && own.iter().all(finite)
         };
-        self.active.iter().copied().find(|&patch| !is_finite(&self.patches[patch]))
+        self.active.iter().zip(self.angles.iter()).find(|(_, own)| !is_finite(own)).map(|(&patch, _)| patch)
     }
 }
 
@@ -454,13 +461,13 @@ impl PlateTerm {
     /// Subtracts Σ ∇r (∇r · v) from the product.
     fn subtract_products(&self, angles: &Angles<'_>, v: &[Vector3<f64>], product: &mut [Vector3<f64>]) {
         let mut rows = Vec::new();
-        for patch in self.active.iter().map(|&patch| &self.patches[patch]) {
+        for (own, vertices) in self.angles.iter().zip(self.vertices.iter()) {
             rows.clear();
-            patch.append_gradients::<Baseline, f64>(&angles.gradients, &mut rows);
+            append_gradients::<Baseline, f64>(own, vertices.len(), &angles.gradients, &mut rows);
             for k in 0..3 {
                 let along = |(&i, row): (&usize, &Row<f64>)| (0..3).map(|axis| row[k][axis] * v[i][axis]).sum::<f64>();
-                let rate: f64 = patch.vertices.iter().zip(&rows).map(along).sum();
-                for (&i, row) in patch.vertices.iter().zip(&rows) {
+                let rate: f64 = vertices.iter().zip(&rows).map(along).sum();
+                for (&i, row) in vertices.iter().zip(&rows) {
                     (0..3).for_each(|axis| product[i][axis] -= rate * row[k][axis]);
                 }
             }
