@@ -42,7 +42,7 @@ pub(super) struct Patch<'a> {
 #[derive(Clone, Copy, Debug)]
 struct Corner {
     /// Positions of the two corners other than the middle in [`Patch::vertices`].
-    ends: [u16; 2],
+    ends: [u32; 2],
     /// Positions among the pairs i ≤ j of vertices: the first end with itself, the second with itself, the first with
     /// the second, the first with the middle, the second with the middle.
     pairs: [u32; 5],
@@ -76,8 +76,7 @@ impl Patches {
             let ([i, j], middle) = (ends, positions[patch]);
             let pairs = [(i, i), (j, j), (i, j), (i, middle), (j, middle)];
             let pairs = pairs.map(|(i, j)| index(pair(vertices.get(patch).len(), i, j)));
-            let ends = ends.map(|end| u16::try_from(end).expect("a vertex has fewer than 65,536 neighbours"));
-            Corner { ends, pairs, gradients: [[0.0; 2]; 2], share: 0.0 }
+            Corner { ends: ends.map(index), pairs, gradients: [[0.0; 2]; 2], share: 0.0 }
         };
         let corners = |(patch, fan): (usize, &Fan)| fan.iter().map(|one| corner(patch, one)).collect::<Vec<_>>();
         let corners = fans.iter().enumerate().map(corners).collect();
@@ -142,8 +141,7 @@ impl Patch<'_> {
     #[inline(always)]
     fn threads(&self, corner: &Corner, x: &[Vector3<f64>]) -> [Padded; 2] {
         let middle = &x[self.vertices[self.middle.position]];
-        let [first, second] =
-            [&x[self.vertices[usize::from(corner.ends[0])]], &x[self.vertices[usize::from(corner.ends[1])]]];
+        let [first, second] = [&x[self.vertices[corner.ends[0] as usize]], &x[self.vertices[corner.ends[1] as usize]]];
         let [[a, b], [c, d]] = corner.gradients;
         let (mut u, mut v) = ([0.0; 4], [0.0; 4]);
         for axis in 0..3 {
@@ -179,7 +177,7 @@ impl Patch<'_> {
             for end in 0..2 {
                 let [along, across] = corner.gradients[end];
                 let (along, across) = (corner.share * along, corner.share * across);
-                let row = &mut to[usize::from(corner.ends[end])];
+                let row = &mut to[corner.ends[end] as usize];
                 for axis in 0..4 {
                     let (uu, vv) = (along * u[axis], across * v[axis]);
                     let uv = along * v[axis] + across * u[axis];
