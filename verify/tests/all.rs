@@ -2,6 +2,7 @@
 #![allow(confusable_idents, missing_docs, mixed_script_confusables, uncommon_codepoints)]
 
 mod accuracy;
+mod bound_names;
 mod broken_elements;
 mod claims;
 mod dual;

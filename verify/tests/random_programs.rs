@@ -8,6 +8,7 @@ use energy_dsl::Inputs;
 use proptest::prelude::*;
 use verify::{Sample, multiprecision};
 
+use super::bound_names::unbound;
 use super::dual::Hyper;
 
 /// Three points, two scalars and a vector.
@@ -121,8 +122,22 @@ fn largest(numbers: &[f64]) -> f64 {
     numbers.iter().fold(0.0, |largest, n| largest.max(n.abs()))
 }
 
+fn source_of(formula: &str) -> String {
+    format!("energy Random({SIGNATURE}) {{ {formula} + 0 * (k + L + dot(u, p - q) + dot(u, r)) }}")
+}
+
+/// Replaces differences of points by weighted sums.
+fn of_sums(formula: &str) -> String {
+    let sums = [
+        ("(q - p)", "((p + q + r) / 3 - p)"),
+        ("(r - q)", "(0.2113248654051871 * q - r + 0.7886751345948129 * p)"),
+        ("(p - r)", "((q - p) / 6 + 0.2113248654051871 * q - 4/3 * r + 0.7886751345948129 * p + (p + q) / 6 + u)"),
+    ];
+    sums.into_iter().fold(formula.to_owned(), |formula, (difference, sum)| formula.replace(difference, sum))
+}
+
 fn check(formula: &str, parameters: &[f64], x: &[f64]) -> Result<(), TestCaseError> {
-    let source = format!("energy Random({SIGNATURE}) {{ {formula} + 0 * (k + L + dot(u, p - q) + dot(u, r)) }}");
+    let source = source_of(formula);
     let textbook = Textbook::from_source(&source).map_err(|e| TestCaseError::fail(format!("{source}: {e}")))?;
     let listing = Listing::from_source(&source).map_err(|e| TestCaseError::fail(format!("{source}: {e}")))?.remove(0);
     let by_duals = expected(&textbook, parameters, x);
@@ -187,13 +202,19 @@ proptest! {
         parameters in prop::collection::vec(0.2..1.8_f64, 5),
         x in prop::collection::vec(-1.0..1.0_f64, 9),
     ) {
-        let sums = [
-            ("(q - p)", "((p + q + r) / 3 - p)"),
-            ("(r - q)", "(0.2113248654051871 * q - r + 0.7886751345948129 * p)"),
-            ("(p - r)", "((q - p) / 6 + 0.2113248654051871 * q - 4/3 * r + 0.7886751345948129 * p + (p + q) / 6 + u)"),
-        ];
-        let formula = sums.into_iter().fold(formula, |formula, (difference, sum)| formula.replace(difference, sum));
-        check(&formula, &parameters, &x)?;
+        check(&of_sums(&formula), &parameters, &x)?;
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 48, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn code_of_random_programs_binds_its_names(formula in (1..4_u32).prop_flat_map(scalar)) {
+        for formula in [of_sums(&formula), formula] {
+            let listings = Listing::from_source(&source_of(&formula)).map_err(|e| TestCaseError::fail(e.to_string()))?;
+            prop_assert_eq!(unbound(&listings[0]), [""; 0], "{}", formula);
+        }
     }
 }
 
