@@ -15,6 +15,9 @@ use energy_dsl::{Declaration, Element, OperationCount, PackedPotential};
 use crate::random::Random;
 use crate::work::Work;
 
+/// A program, and its work on all elements.
+type Contender = (Program, Work);
+
 /// A declared formula, where to evaluate it, and how it runs.
 #[derive(Debug)]
 pub struct Formula {
@@ -25,7 +28,7 @@ pub struct Formula {
     /// Points around which the element is drawn.
     points: &'static [[f64; 3]],
     expected: fn(&[f64]) -> Vec<f64>,
-    contenders: fn(&[f64], usize) -> Vec<(Program, Work)>,
+    contenders: fn(&[f64], usize) -> Vec<Contender>,
 }
 
 /// How far random points lie from those of [`Formula`], in each direction.

@@ -14,7 +14,8 @@ use super::Program;
 /// The running script. It ends when it is dropped.
 pub(super) struct Script {
     process: Child,
-    commands: ChildStdin,
+    /// `None` only while it is dropped.
+    commands: Option<ChildStdin>,
     answers: BufReader<ChildStdout>,
 }
 
@@ -38,7 +39,7 @@ impl Script {
         let (Some(commands), Some(answers)) = (process.stdin.take(), process.stdout.take()) else {
             bail!("no pipes to {}", python.display());
         };
-        let mut script = Self { process, commands, answers: BufReader::new(answers) };
+        let mut script = Self { process, commands: Some(commands), answers: BufReader::new(answers) };
         let Notes { notes } = script.answer()?;
         Ok((script, notes))
     }
@@ -56,7 +57,9 @@ impl Script {
 
     fn command<T: DeserializeOwned>(&mut self, command: &str) -> anyhow::Result<T> {
         // If the script has ended, its answer says so.
-        let _ = writeln!(self.commands, "{command}").and_then(|()| self.commands.flush());
+        if let Some(commands) = &mut self.commands {
+            let _ = writeln!(commands, "{command}").and_then(|()| commands.flush());
+        }
         self.answer()
     }
 
@@ -72,7 +75,8 @@ impl Script {
 
 impl Drop for Script {
     fn drop(&mut self) {
-        let _ = self.process.kill();
+        // At the end of its commands, the script removes its files and ends.
+        self.commands = None;
         let _ = self.process.wait();
     }
 }

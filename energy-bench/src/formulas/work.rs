@@ -7,7 +7,7 @@ use energy_dsl::{
     Aligned, Array, BLOCK, Block, Kernel, Lane, Level, Packed, PackedPotential, Potential, dispatch, level,
 };
 
-use super::Program;
+use super::{Contender, Program};
 use crate::sample::potential;
 use crate::work::{Doubles, Work};
 
@@ -38,7 +38,7 @@ pub(super) fn expected<E: PackedPotential<f64, Wide<f64> = E>>(numbers: &[f64]) 
 }
 
 /// Returns the ways to evaluate `count` elements, a multiple of 16, which repeat those of `numbers`.
-pub(super) fn contenders<E>(numbers: &[f64], count: usize) -> Vec<(Program, Work)>
+pub(super) fn contenders<E>(numbers: &[f64], count: usize) -> Vec<Contender>
 where
     E: PackedPotential<f64, Wide<f64> = E> + 'static,
 {
