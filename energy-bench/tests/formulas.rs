@@ -46,6 +46,12 @@ fn files_have_all_numbers() {
 
 #[test]
 fn an_unknown_name_is_an_error_that_lists_all() {
-    let error = formulas(&Options { names: vec!["Spring".to_owned()], ..options() }).expect_err("no such formula");
-    assert!(error.to_string().contains("LennardJones") && error.to_string().contains("`Spring`"), "{error}");
+    let options = Options { names: vec!["Spring".to_owned()], ..options() };
+    let folder = std::env::temp_dir().join("energy-bench-no-such-formula");
+    let errors =
+        [formulas(&options).expect_err("no such formula"), write_inputs(&options, &folder).expect_err("nor here")];
+    for error in errors {
+        assert!(error.to_string().contains("LennardJones") && error.to_string().contains("`Spring`"), "{error}");
+    }
+    assert!(!folder.exists(), "nothing is written");
 }

@@ -68,8 +68,15 @@ pub struct Options {
 }
 
 impl Options {
-    fn formulas(&self) -> impl Iterator<Item = &'static Formula> {
-        FORMULAS.iter().filter(|formula| self.names.is_empty() || self.names.iter().any(|name| name == formula.name()))
+    /// Returns the wanted formulas.
+    fn formulas(&self) -> anyhow::Result<Vec<&'static Formula>> {
+        let known: Vec<&str> = FORMULAS.iter().map(Formula::name).collect();
+        for name in &self.names {
+            ensure!(known.contains(&name.as_str()), "expected a formula out of {}, got `{name}`", known.join(", "));
+        }
+        let is_wanted =
+            |formula: &&Formula| self.names.is_empty() || self.names.iter().any(|name| name == formula.name());
+        Ok(FORMULAS.iter().filter(is_wanted).collect())
     }
 
     /// The elements of inputs; more elements repeat them.
@@ -129,10 +136,11 @@ pub struct Formulas {
 /// Writes the inputs and expected results of the wanted formulas to `folder`, as little-endian doubles.
 ///
 /// # Errors
-/// Fails if the folder or a file cannot be written.
+/// Fails if a name is unknown, or if the folder or a file cannot be written.
 pub fn write_inputs(options: &Options, folder: &Path) -> anyhow::Result<()> {
+    let formulas = options.formulas()?;
     std::fs::create_dir_all(folder).with_context(|| format!("cannot create {}", folder.display()))?;
-    for formula in options.formulas() {
+    for formula in formulas {
         let inputs = formula.inputs(options.drawn());
         for (name, numbers) in [("expected", formula.expected(&inputs)), ("inputs", inputs)] {
             let bytes: Vec<u8> = numbers.into_iter().flat_map(f64::to_le_bytes).collect();
@@ -148,10 +156,6 @@ pub fn write_inputs(options: &Options, folder: &Path) -> anyhow::Result<()> {
 /// # Errors
 /// Fails if a name is unknown, if the script fails, or if results differ.
 pub fn formulas(options: &Options) -> anyhow::Result<Formulas> {
-    for name in &options.names {
-        let known: Vec<&str> = FORMULAS.iter().map(Formula::name).collect();
-        ensure!(known.contains(&name.as_str()), "expected a formula out of {}, got `{name}`", known.join(", "));
-    }
     let mut report = Formulas { repetitions: options.repetitions, notes: Vec::new(), formulas: Vec::new() };
     let Some(python) = &options.python else {
         report.notes.push(
@@ -176,7 +180,7 @@ pub fn formulas(options: &Options) -> anyhow::Result<Formulas> {
 }
 
 fn measure_all(options: &Options, mut script: Option<&mut Script>, report: &mut Formulas) -> anyhow::Result<()> {
-    for formula in options.formulas() {
+    for formula in options.formulas()? {
         for &elements in &options.elements {
             report.formulas.push(measure(formula, elements, options, script.as_deref_mut())?);
         }

@@ -37,6 +37,7 @@ pub struct PlateTerm {
     limits: Option<Vec<f64>>,
     /// L of the rigidity D = L Lᵀ.
     factor: Matrix,
+    /// All triangles that resist bending; a restricted term has the lists of its active ones alone.
     patches: Vec<Patch>,
     /// How each patch yields; empty if they do not.
     frictions: Vec<Friction>,
