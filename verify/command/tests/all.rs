@@ -5,6 +5,7 @@ mod bench;
 mod c;
 mod c_mixed;
 mod command_line;
+mod cover;
 mod elements;
 mod errata;
 mod fusion_reference;

@@ -10,6 +10,8 @@ use verify_command::catalogue;
 use verify_command::reference::{Record, mapping};
 use verify_command::stress::sweeps;
 
+use super::cover::sufficient;
+
 /// A compiler of C or C++, with the options that all code must compile with.
 pub struct Compiler {
     command: Vec<String>,
@@ -284,9 +286,8 @@ fn cases<S: Bits>(elements: &[Interpreted]) -> Vec<Case<S>> {
     cases
 }
 
-/// Elements to compare, in text and compiled, with and without routines of single vertices, and inputs for them.
+/// Elements to compare, with and without routines of single vertices, and inputs for them.
 pub struct Suite<S> {
-    pub text: String,
     pub elements: Vec<Interpreted>,
     pub plain: Vec<Interpreted>,
     pub cases: Vec<Case<S>>,
@@ -301,10 +302,30 @@ impl<S: Bits> Suite<S> {
             Interpreted::from_source(&entry.declaration.source).unwrap().pop().unwrap()
         };
         Self {
-            text: all.iter().map(|entry| format!("{}\n", entry.declaration.source)).collect(),
             plain: all.iter().map(plain).collect(),
             cases: cases(&elements),
             elements,
+        }
+    }
+
+    /// Returns elements that have all operations of all of them.
+    pub fn sufficient(self) -> Self {
+        let chosen = sufficient(&self.elements);
+        self.only(&chosen)
+    }
+
+    /// Returns the chosen elements, numbered anew.
+    pub fn only(self, chosen: &[usize]) -> Self {
+        let of = |elements: &[Interpreted]| chosen.iter().map(|&number| elements[number].clone()).collect();
+        let renumbered = |case: Case<S>| {
+            let element = chosen.iter().position(|&number| number == case.element)?;
+            Some(Case { element, ..case })
+        };
+        let Self { elements, plain, cases } = self;
+        Self {
+            elements: of(&elements),
+            plain: of(&plain),
+            cases: cases.into_iter().filter_map(renumbered).collect(),
         }
     }
 }
@@ -319,9 +340,8 @@ pub fn check<S: Bits>(compiler: &Compiler, name: &str, suite: impl FnOnce() -> S
         println!("skipped: this processor has no fused operations");
         return None;
     }
-    let Suite { text, elements, plain, cases } = suite();
+    let Suite { elements, plain, cases } = suite();
     let folder = folder(name);
-    std::fs::write(folder.join("elements.energy"), text).unwrap();
     let program = compiled(compiler, &elements, S::PRECISION, &folder);
     let records = folder.join("records");
     std::fs::write(&records, cases.iter().flat_map(Case::bytes).collect::<Vec<u8>>()).unwrap();
@@ -333,25 +353,21 @@ pub fn check<S: Bits>(compiler: &Compiler, name: &str, suite: impl FnOnce() -> S
     Some(counts)
 }
 
-fn check_points<S: Bits>(compiler: &Compiler, name: &str) {
-    let counts = check::<S>(compiler, name, Suite::of_points);
+#[test]
+fn c_has_the_bits_of_rust() {
+    let counts = check::<f64>(&Compiler::new("gcc -std=c99"), "c-f64", Suite::of_points);
     assert!(counts.is_none_or(|counts| counts.routines > 10_000));
     assert!(catalogue::elements().iter().any(|entry| entry.declaration.kind == Kind::Residual));
 }
 
 #[test]
-fn c_has_the_bits_of_rust() {
-    check_points::<f64>(&Compiler::new("gcc -std=c99"), "c-f64");
-}
-
-#[test]
 fn c_in_single_precision_has_the_bits_of_rust() {
-    check_points::<f32>(&Compiler::new("gcc -std=c99"), "c-f32");
+    check::<f32>(&Compiler::new("gcc -std=c99"), "c-f32", || Suite::of_points().sufficient());
 }
 
 #[test]
 fn c_by_clang_has_the_bits_of_rust() {
-    check_points::<f64>(&Compiler::clang(), "c-clang-f64");
+    check::<f64>(&Compiler::clang(), "c-clang-f64", || Suite::of_points().sufficient());
 }
 
 /// Projected Hessians are the nearest positive semi-definite matrices: Q max(Λ, 0) Qᵀ of nalgebra's decomposition.
@@ -432,17 +448,12 @@ fn loops<S: Bits>(name: &str, first: usize) {
         println!("skipped: there is no gcc");
         return;
     }
-    let all: Vec<Interpreted> = catalogue::elements().iter().map(|entry| interpreted(entry.declaration)).collect();
-    let cases = cases::<S>(&all);
-    let chosen: Vec<usize> = (first..all.len()).step_by(5).collect();
-    let elements: Vec<Interpreted> = chosen.iter().map(|&number| all[number].clone()).collect();
-    let renumbered = cases.into_iter().filter_map(|case| {
-        let element = chosen.iter().position(|&number| number == case.element)?;
-        Some(Case { element, ..case })
-    });
+    let all = Suite::<S>::of_points();
+    let chosen: Vec<usize> = (first..all.elements.len()).step_by(5).collect();
+    let Suite { elements, cases, .. } = all.only(&chosen);
     let folder = folder(name);
     let records = folder.join("records");
-    std::fs::write(&records, renumbered.flat_map(|case| case.bytes()).collect::<Vec<u8>>()).unwrap();
+    std::fs::write(&records, cases.iter().flat_map(Case::bytes).collect::<Vec<u8>>()).unwrap();
     let (real, suffix) = (if S::PRECISION == Precision::Double { "double" } else { "float" }, S::PRECISION.name());
     let mut text = String::new();
     let mut names = Vec::new();
@@ -470,7 +481,7 @@ fn loops<S: Bits>(name: &str, first: usize) {
     let output = Command::new("gcc")
         .args(["-std=c99", "-march=native"])
         .args(OPTIONS)
-        .arg("-I")
+        .args(["-O0", "-I"])
         .arg(&folder)
         .arg(driver)
         .arg("-o")

@@ -30,27 +30,23 @@ fn suite<S: Bits>() -> Suite<S> {
         samples(element.declaration()).iter().map(case).collect::<Vec<_>>()
     };
     let cases = elements.iter().enumerate().flat_map(cases_of).collect();
-    Suite { text: texts.join("\n"), elements, plain, cases }
-}
-
-fn check_all<S: Bits>(compiler: &Compiler, name: &str) {
-    let counts = check::<S>(compiler, name, suite);
-    assert!(counts.is_none_or(|counts| counts.routines > 5_000 && counts.flagged > 100));
+    Suite { elements, plain, cases }
 }
 
 #[test]
 fn c_has_the_bits_of_rust() {
-    check_all::<f64>(&Compiler::new("gcc -std=c99"), "c-mixed-f64");
+    let counts = check::<f64>(&Compiler::new("gcc -std=c99"), "c-mixed-f64", suite);
+    assert!(counts.is_none_or(|counts| counts.routines > 5_000 && counts.flagged > 100));
 }
 
 #[test]
 fn c_in_single_precision_has_the_bits_of_rust() {
-    check_all::<f32>(&Compiler::new("gcc -std=c99").unoptimised(), "c-mixed-f32");
+    check::<f32>(&Compiler::new("gcc -std=c99").unoptimised(), "c-mixed-f32", || suite().sufficient());
 }
 
 #[test]
 fn c_by_clang_has_the_bits_of_rust() {
-    check_all::<f64>(&Compiler::clang().unoptimised(), "c-mixed-clang-f64");
+    check::<f64>(&Compiler::clang().unoptimised(), "c-mixed-clang-f64", || suite().sufficient());
 }
 
 /// Elements whose loops are compared: of each kind of declaration and of unknowns, with and without a state.
@@ -82,15 +78,10 @@ fn loops<S: Bits>(name: &str) {
         println!("skipped: there is no gcc");
         return;
     }
-    let Suite { elements, cases, .. } = suite::<S>();
-    let is_chosen = |element: &Interpreted| LOOPS.contains(&&*element.declaration().name);
-    let chosen: Vec<usize> = (0..elements.len()).filter(|&number| is_chosen(&elements[number])).collect();
-    let renumbered = |mut case: Case<S>| {
-        case.element = chosen.iter().position(|&number| number == case.element)?;
-        Some(case)
-    };
-    let cases: Vec<Case<S>> = cases.into_iter().filter_map(renumbered).collect();
-    let elements: Vec<Interpreted> = chosen.iter().map(|&number| elements[number].clone()).collect();
+    let all = suite::<S>();
+    let is_chosen = |number: &usize| LOOPS.contains(&&*all.elements[*number].declaration().name);
+    let chosen: Vec<usize> = (0..all.elements.len()).filter(is_chosen).collect();
+    let Suite { elements, cases, .. } = all.only(&chosen);
     let folder = folder(name);
     let records = folder.join("records");
     std::fs::write(&records, cases.iter().flat_map(Case::bytes).collect::<Vec<u8>>()).unwrap();

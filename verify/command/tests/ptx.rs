@@ -34,54 +34,179 @@ fn ptx_has_the_operations_of_the_plan() {
         println!("skipped: no nvcc in PATH, and none named by NVCC");
         return;
     };
-    let interpreted = |(name, _): (&str, &str)| {
-        let entry = catalogue::find(name);
-        let text = &entry.expect("the catalogue has it").declaration.source;
-        let elements = Interpreted::from_file_with_vertices(text, name, &Budget::default()).expect("it compiles");
-        elements.into_iter().next_back().expect("it declares the element")
-    };
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("ptx");
-    std::fs::create_dir_all(&folder).unwrap();
-    let files = sources(&KERNELS.map(interpreted), Target::Cuda, &[Precision::Single]).unwrap();
-    for file in &files {
-        std::fs::write(folder.join(&file.name), &file.text).unwrap();
-    }
-    let sources = files.iter().filter_map(|file| file.name.strip_suffix(".cu"));
-    for (name, (element, routine)) in sources.zip(KERNELS) {
-        // Fused operations are allowed: intrinsics are not to be contracted.
-        let (source, ptx) = (folder.join(format!("{name}.cu")), folder.join(format!("{name}.ptx")));
-        let output =
-            Command::new(&nvcc).args(["-ptx", "-arch=sm_80"]).arg(source).arg("-o").arg(&ptx).output().unwrap();
-        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-        let ptx = std::fs::read_to_string(ptx).unwrap();
-        assert!(!ptx.contains(".f64"), "{element}: double precision");
-        let found = instructions(&ptx, &format!("{name}_{routine}_kernel"));
-        let expected = operations(&files, name, routine);
+    let elements = KERNELS.map(|(name, _)| interpreted(name));
+    let generated = Generated::new("ptx", &elements, Precision::Single);
+    for (name, (element, routine)) in generated.names.iter().zip(KERNELS) {
+        let ptx = generated.ptx(&nvcc, name, "sm_80");
+        let [found, expected] = generated.counts(name, routine, &ptx).expect("straight-line code");
         println!("{element}, {routine}: {found:?}");
         assert_eq!(found, expected, "{element}, {routine}");
     }
 }
 
+/// All routines of all elements, with points and with any unknowns, in both precisions.
+#[test]
+#[ignore = "takes minutes"]
+fn ptx_of_all_elements_has_the_operations_of_the_plan() {
+    let Some(nvcc) = nvcc() else {
+        println!("skipped: no nvcc in PATH, and none named by NVCC");
+        return;
+    };
+    let named = catalogue::elements().iter().map(|entry| interpreted(&entry.declaration.name));
+    let text = include_str!("../../tests/unknowns.energy");
+    let mixed = Interpreted::from_file(text, "unknowns.energy").expect("it compiles");
+    let elements: Vec<Interpreted> = named.chain(mixed).collect();
+    for (precision, folder, newest) in
+        [(Precision::Single, "ptx-f32", "sm_120"), (Precision::Double, "ptx-f64", "sm_75")]
+    {
+        let generated = Generated::new(folder, &elements, precision);
+        let (mut equal, mut different, mut branching) = (0, Vec::new(), 0);
+        for name in &generated.names {
+            let ptx = generated.ptx(&nvcc, name, newest);
+            for routine in generated.routines(name) {
+                match generated.counts(name, &routine, &ptx) {
+                    Some([found, expected]) if found == expected => equal += 1,
+                    Some([found, expected]) => different.push(format!("{name}_{routine}: {found:?}, text {expected:?}")),
+                    None => branching += 1,
+                }
+            }
+        }
+        println!("{folder}, {newest}: {equal} routines equal, {branching} with loops left out; {different:#?}");
+        assert!(different.is_empty(), "{different:#?}");
+    }
+}
+
+/// Generated CUDA in a folder.
+struct Generated {
+    folder: PathBuf,
+    precision: &'static str,
+    files: Vec<SourceFile>,
+    /// Elements, as files name them.
+    names: Vec<String>,
+}
+
+impl Generated {
+    fn new(name: &str, elements: &[Interpreted], precision: Precision) -> Self {
+        let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
+        std::fs::create_dir_all(&folder).unwrap();
+        let files = sources(elements, Target::Cuda, &[precision]).unwrap();
+        for file in &files {
+            std::fs::write(folder.join(&file.name), &file.text).unwrap();
+        }
+        let names = files.iter().filter_map(|file| Some(file.name.strip_suffix(".cu")?.to_owned())).collect();
+        let precision = if precision == Precision::Single { "f32" } else { "f64" };
+        Self { folder, precision, files, names }
+    }
+
+    fn text(&self, name: &str) -> &str {
+        &self.files.iter().find(|file| file.name == name).expect("the file was written").text
+    }
+
+    /// Compiles an element. Fused operations are allowed: intrinsics are not to be contracted.
+    fn ptx(&self, nvcc: &Path, element: &str, architecture: &str) -> String {
+        let [source, ptx] = ["cu", "ptx"].map(|ending| self.folder.join(format!("{element}.{ending}")));
+        let mut command = Command::new(nvcc);
+        command.args(["-ptx", "-Werror", "all-warnings", &format!("-arch={architecture}")]);
+        let output = command.arg(source).arg("-o").arg(&ptx).output().unwrap();
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        let ptx = std::fs::read_to_string(ptx).unwrap();
+        assert!(self.precision == "f64" || !ptx.contains(".f64"), "{element}: double precision");
+        ptx
+    }
+
+    /// Routines that have a kernel and compute in its ordinary part.
+    fn routines(&self, element: &str) -> Vec<String> {
+        let kernels = self.text(&format!("{element}.cu"));
+        let named = kernels.split("__global__ void ").skip(1).filter_map(|text| text.split_once("_kernel("));
+        let routines = named.filter_map(|(name, _)| name.strip_prefix(element)?.strip_prefix('_'));
+        // These have no statements of their own: they expand, project or choose what others compute.
+        let wrapped = |routine: &str| {
+            routine == "projected_hessian"
+                || routine == "vertex"
+                || routine == "hessian" && kernels.contains("reduced_hessian_kernel")
+        };
+        routines.filter(|routine| !wrapped(routine)).map(str::to_owned).collect()
+    }
+
+    /// Counts the operations of a kernel in PTX and in the text; `None` if the text has loops.
+    fn counts(&self, element: &str, routine: &str, ptx: &str) -> Option<[Counts; 2]> {
+        let expected = operations(self, element, routine)?;
+        Some([instructions(ptx, &format!("{element}_{routine}_kernel"), self.precision), expected])
+    }
+}
+
+/// The kernels of the book compile without warnings. Those for RXMesh need its headers and what they include, in the
+/// folders that `RXMESH_INCLUDE` lists.
+#[test]
+fn kernels_of_the_book_compile() {
+    let Some(nvcc) = nvcc() else {
+        println!("skipped: no nvcc in PATH, and none named by NVCC");
+        return;
+    };
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("ptx-book");
+    std::fs::create_dir_all(&folder).unwrap();
+    let elements = ["HookeSpring", "QuadraticHinge"].map(interpreted);
+    for file in sources(&elements, Target::Cuda, &[Precision::Single]).unwrap() {
+        std::fs::write(folder.join(&file.name), &file.text).unwrap();
+    }
+    let chapter = include_str!("../../../docs/book/from-cuda.md");
+    let blocks: Vec<&str> =
+        chapter.split("```cuda\n").skip(1).map(|text| text.split("```").next().unwrap_or_default()).collect();
+    let [launch, vectors, accessors, rxmesh] = blocks[..] else { panic!("{} blocks", blocks.len()) };
+    let compile = |name: &str, text: &str, flags: &[&str]| {
+        let (source, ptx) = (folder.join(format!("{name}.cu")), folder.join(format!("{name}.ptx")));
+        std::fs::write(&source, text).unwrap();
+        let mut command = Command::new(&nvcc);
+        command.args(["-std=c++17", "-ptx", "-arch=sm_80"]).args(flags).arg("-I").arg(&folder);
+        let output = command.arg(&source).arg("-o").arg(ptx).output().unwrap();
+        assert!(output.status.success(), "{name}: {}", String::from_utf8_lossy(&output.stderr));
+    };
+    for (name, text) in [("launch", launch), ("vectors", vectors), ("accessors", accessors)] {
+        compile(name, text, &["-Werror", "all-warnings"]);
+    }
+    let Some(folders) = std::env::var_os("RXMESH_INCLUDE") else {
+        println!("skipped: RXMESH_INCLUDE does not name folders with headers of RXMesh");
+        return;
+    };
+    let include: Vec<String> =
+        std::env::split_paths(&folders).map(|folder| format!("-I{}", folder.display())).collect();
+    let rates = ["-DclockRate=multiProcessorCount", "-DmemoryClockRate=memoryBusWidth"];
+    let flags = ["--expt-extended-lambda", "--expt-relaxed-constexpr"].into_iter().chain(rates);
+    let flags: Vec<&str> = flags.chain(include.iter().map(String::as_str)).collect();
+    let wrapper = accessors.split("/* Stand-ins").next().unwrap_or_default();
+    compile("rxmesh", &format!("{wrapper}{rxmesh}"), &flags);
+}
+
+fn interpreted(name: &str) -> Interpreted {
+    let text = &catalogue::find(name).expect("the catalogue has it").declaration.source;
+    let elements = Interpreted::from_file_with_vertices(text, name, &Budget::default()).expect("it compiles");
+    elements.into_iter().next_back().expect("it declares the element")
+}
+
 /// Counts the instructions of a kernel. Each is rounded to nearest; sums in memory have no rounding of their own.
-fn instructions(ptx: &str, kernel: &str) -> Counts {
-    let begin = ptx.find(&format!("{kernel}16")).expect("PTX has the kernel");
-    let body = &ptx[begin..];
+fn instructions(ptx: &str, kernel: &str, precision: &str) -> Counts {
+    // The name goes on with the length and the name of the argument's type.
+    let begin = ["16energy", "22energy"].iter().find_map(|argument| ptx.find(&format!("{kernel}{argument}")));
+    let body = &ptx[begin.expect("PTX has the kernel")..];
     let body = &body[..body.find("\n}").expect("the kernel ends")];
+    let (ending, rounded) = (format!(".{precision}"), format!("rn.{precision}"));
     let mut counts = Counts::new();
-    for instruction in body.lines().filter_map(|line| line.split_whitespace().find(|word| word.ends_with(".f32"))) {
+    for instruction in body.lines().filter_map(|line| line.split_whitespace().find(|word| word.ends_with(&ending))) {
         let (name, rest) = instruction.split_once('.').expect("it has a type");
         let Some(&(_, name)) = OPERATIONS.iter().find(|(_, of_ptx)| *of_ptx == name) else { continue };
-        assert_eq!(rest, "rn.f32", "{instruction}");
+        assert_eq!(rest, rounded, "{instruction}");
         *counts.entry(name).or_default() += 1;
     }
     counts
 }
 
-/// Counts the operations of a routine in the generated text. Equal ones with equal operands count once.
-fn operations(files: &[SourceFile], element: &str, routine: &str) -> Counts {
-    let text = |name: &str| &*files.iter().find(|file| file.name == name).expect("the file was written").text;
-    let (shared, own) = (text("energy_f32.h"), text(&format!("{element}.h")));
-    let mut values = Values { functions: HashMap::new(), known: HashMap::new(), counts: Counts::new() };
+/// Counts the operations of a routine in the generated text. Equal ones with equal operands count once. `None` if it has
+/// loops.
+fn operations(generated: &Generated, element: &str, routine: &str) -> Option<Counts> {
+    let precision = generated.precision;
+    let (shared, own) = (generated.text(&format!("energy_{precision}.h")), generated.text(&format!("{element}.h")));
+    let prefix = format!("energy_{precision}_");
+    let mut values = Values { prefix, functions: HashMap::new(), known: HashMap::new(), counts: Counts::new() };
     for (signature, body) in shared.split("\nENERGY_").skip(1).filter_map(|function| function.split_once(" {")) {
         values.functions.insert(function_name(signature), (parameters(signature), statements(body)));
     }
@@ -90,8 +215,11 @@ fn operations(files: &[SourceFile], element: &str, routine: &str) -> Counts {
     let (_, body) = named(format!("{element}_{routine}_if_ordinary"))
         .or_else(|| named(format!("{element}_{routine}")))
         .expect("the routine was written");
+    if body.split("\n}").next().is_some_and(|body| body.contains("for (")) {
+        return None;
+    }
     values.run(&statements(body), HashMap::new());
-    values.counts
+    Some(values.counts)
 }
 
 /// Returns the last word before the arguments.
@@ -117,6 +245,8 @@ fn statements(body: &str) -> Vec<String> {
 
 /// Value numbering of straight-line code.
 struct Values {
+    /// Begins the names of shared functions.
+    prefix: String,
     functions: HashMap<String, (Vec<String>, Vec<String>)>,
     /// Numbers of expressions whose operands are numbers.
     known: HashMap<String, usize>,
@@ -157,12 +287,12 @@ impl Values {
                 let name = word.trim_end_matches(|c: char| !(c.is_alphanumeric() || c == '_'));
                 names.get(name).map_or_else(|| word.to_owned(), |number| word.replace(name, &format!("#{number}")))
             });
-            let has = |(name, _): &(&str, &str)| text.contains(&format!("energy_f32_{name}("));
+            let has = |(name, _): &(&str, &str)| text.contains(&format!("{}{name}(", self.prefix));
             assert!(!OPERATIONS.iter().any(has), "operations inside of another expression: {text}");
             return self.number(key.collect());
         };
         let operands: Vec<usize> = arguments(list).iter().map(|operand| self.value(operand, names)).collect();
-        let short = function.trim_start_matches("energy_f32_");
+        let short = function.strip_prefix(&self.prefix).unwrap_or(function);
         if let Some(&(_, operation)) = OPERATIONS.iter().find(|(name, _)| *name == short) {
             let (before, key) = (self.known.len(), format!("{operation}{operands:?}"));
             let number = self.number(key);

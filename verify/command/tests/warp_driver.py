@@ -14,6 +14,8 @@ import warp as wp
 import energies
 
 wp.config.quiet = True
+# Kernels compile in a third of the time. Numbers do not depend on the level.
+wp.config.optimization_level = 1
 FOLDER = Path(sys.argv[1])
 #: Types of arguments and results. Kernels name them by their number.
 TYPES = []
