@@ -1,14 +1,11 @@
 //! Operations and compile time grow polynomially with the size of a formula. The test prints the curve:
-//! `cargo test --release -p energy-compiler --test growth -- --nocapture`.
-#![allow(missing_docs)]
+//! `cargo test --release -p energy-compiler --test budget growth -- --nocapture`.
 
 use std::fmt::Write as _;
 use std::time::{Duration, Instant};
 
+use super::random::Random;
 use energy_compiler::Listing;
-use random::Random;
-
-mod random;
 
 /// A chain of `size` lets over `points` points, each a random operation on two of the values before it.
 fn program(size: usize, points: usize, seed: u64) -> String {

@@ -301,11 +301,7 @@ impl<S: Bits> Suite<S> {
         let plain = |entry: &energy_dsl::AnyElement| {
             Interpreted::from_source(&entry.declaration.source).unwrap().pop().unwrap()
         };
-        Self {
-            plain: all.iter().map(plain).collect(),
-            cases: cases(&elements),
-            elements,
-        }
+        Self { plain: all.iter().map(plain).collect(), cases: cases(&elements), elements }
     }
 
     /// Returns elements that have all operations of all of them.
@@ -322,11 +318,7 @@ impl<S: Bits> Suite<S> {
             Some(Case { element, ..case })
         };
         let Self { elements, plain, cases } = self;
-        Self {
-            elements: of(&elements),
-            plain: of(&plain),
-            cases: cases.into_iter().filter_map(renumbered).collect(),
-        }
+        Self { elements: of(&elements), plain: of(&plain), cases: cases.into_iter().filter_map(renumbered).collect() }
     }
 }
 

@@ -16,9 +16,9 @@ const KERNELS: [(&str, &str); 5] = [
     ("PointToPlane", "jacobian"),
 ];
 
-/// Functions of the text, with the names of PTX.
+/// Functions of the text, with the names of PTX. Compilers take x + (−y) and x − y for each other.
 const OPERATIONS: [(&str, &str); 6] =
-    [("add", "add"), ("sub", "sub"), ("mul", "mul"), ("mul_add", "fma"), ("div", "div"), ("sqrt", "sqrt")];
+    [("add", "add"), ("sub", "add"), ("mul", "mul"), ("mul_add", "fma"), ("div", "div"), ("sqrt", "sqrt")];
 
 type Counts = BTreeMap<&'static str, usize>;
 
@@ -38,7 +38,7 @@ fn ptx_has_the_operations_of_the_plan() {
     let generated = Generated::new("ptx", &elements, Precision::Single);
     for (name, (element, routine)) in generated.names.iter().zip(KERNELS) {
         let ptx = generated.ptx(&nvcc, name, "sm_80");
-        let [found, expected] = generated.counts(name, routine, &ptx).expect("straight-line code");
+        let Counted { found, expected, .. } = generated.counts(name, routine, &ptx);
         println!("{element}, {routine}: {found:?}");
         assert_eq!(found, expected, "{element}, {routine}");
     }
@@ -56,23 +56,26 @@ fn ptx_of_all_elements_has_the_operations_of_the_plan() {
     let text = include_str!("../../tests/unknowns.energy");
     let mixed = Interpreted::from_file(text, "unknowns.energy").expect("it compiles");
     let elements: Vec<Interpreted> = named.chain(mixed).collect();
-    for (precision, folder, newest) in
-        [(Precision::Single, "ptx-f32", "sm_120"), (Precision::Double, "ptx-f64", "sm_75")]
-    {
+    for (precision, folder) in [(Precision::Single, "ptx-f32"), (Precision::Double, "ptx-f64")] {
         let generated = Generated::new(folder, &elements, precision);
-        let (mut equal, mut different, mut branching) = (0, Vec::new(), 0);
+        let (mut equal, mut repeated, mut different) = (0, 0, Vec::new());
         for name in &generated.names {
-            let ptx = generated.ptx(&nvcc, name, newest);
+            let ptx = generated.ptx(&nvcc, name, "sm_80");
             for routine in generated.routines(name) {
-                match generated.counts(name, &routine, &ptx) {
-                    Some([found, expected]) if found == expected => equal += 1,
-                    Some([found, expected]) => different.push(format!("{name}_{routine}: {found:?}, text {expected:?}")),
-                    None => branching += 1,
+                let Counted { found, expected, has_branches } = generated.counts(name, &routine, &ptx);
+                // What follows a branch may be compiled once for each of its ways.
+                let has_all = expected.iter().all(|(name, count)| found.get(name).is_some_and(|found| found >= count));
+                if found == expected {
+                    equal += 1;
+                } else if has_branches && has_all {
+                    repeated += 1;
+                } else {
+                    different.push(format!("{name}_{routine}: {found:?}, text {expected:?}"));
                 }
             }
         }
-        println!("{folder}, {newest}: {equal} routines equal, {branching} with loops left out; {different:#?}");
-        assert!(different.is_empty(), "{different:#?}");
+        println!("{folder}: {equal} routines equal, {repeated} with repeated operations, {} others", different.len());
+        assert!(different.is_empty() && equal > 10 * repeated, "{different:#?}");
     }
 }
 
@@ -128,11 +131,18 @@ impl Generated {
         routines.filter(|routine| !wrapped(routine)).map(str::to_owned).collect()
     }
 
-    /// Counts the operations of a kernel in PTX and in the text; `None` if the text has loops.
-    fn counts(&self, element: &str, routine: &str, ptx: &str) -> Option<[Counts; 2]> {
-        let expected = operations(self, element, routine)?;
-        Some([instructions(ptx, &format!("{element}_{routine}_kernel"), self.precision), expected])
+    fn counts(&self, element: &str, routine: &str, ptx: &str) -> Counted {
+        let found = instructions(ptx, &format!("{element}_{routine}_kernel"), self.precision);
+        let Values { counts: expected, has_branches, .. } = operations(self, element, routine);
+        Counted { found, expected, has_branches }
     }
+}
+
+/// Operations of a kernel in PTX and in the text, and whether the text has branches: sines of huge arguments, loops.
+struct Counted {
+    found: Counts,
+    expected: Counts,
+    has_branches: bool,
 }
 
 /// The kernels of the book compile without warnings. Those for RXMesh need its headers and what they include, in the
@@ -193,6 +203,7 @@ fn instructions(ptx: &str, kernel: &str, precision: &str) -> Counts {
     let mut counts = Counts::new();
     for instruction in body.lines().filter_map(|line| line.split_whitespace().find(|word| word.ends_with(&ending))) {
         let (name, rest) = instruction.split_once('.').expect("it has a type");
+        let name = if name == "sub" { "add" } else { name };
         let Some(&(_, name)) = OPERATIONS.iter().find(|(_, of_ptx)| *of_ptx == name) else { continue };
         assert_eq!(rest, rounded, "{instruction}");
         *counts.entry(name).or_default() += 1;
@@ -200,26 +211,26 @@ fn instructions(ptx: &str, kernel: &str, precision: &str) -> Counts {
     counts
 }
 
-/// Counts the operations of a routine in the generated text. Equal ones with equal operands count once. `None` if it has
-/// loops.
-fn operations(generated: &Generated, element: &str, routine: &str) -> Option<Counts> {
+/// Counts the operations of a routine in the generated text. Equal ones with equal operands count once.
+fn operations(generated: &Generated, element: &str, routine: &str) -> Values {
     let precision = generated.precision;
     let (shared, own) = (generated.text(&format!("energy_{precision}.h")), generated.text(&format!("{element}.h")));
     let prefix = format!("energy_{precision}_");
-    let mut values = Values { prefix, functions: HashMap::new(), known: HashMap::new(), counts: Counts::new() };
+    let mut values = Values { prefix, ..Values::default() };
     for (signature, body) in shared.split("\nENERGY_").skip(1).filter_map(|function| function.split_once(" {")) {
-        values.functions.insert(function_name(signature), (parameters(signature), statements(body)));
+        let body = body.split("\n}").next().unwrap_or_default();
+        let has_branches = body.contains("if (") || body.contains("for (");
+        let function = Function { parameters: parameters(signature), statements: statements(body), has_branches };
+        values.functions.insert(function_name(signature), function);
     }
     let functions = || own.split("\nENERGY_").filter_map(|function| function.split_once(" {"));
     let named = |name: String| functions().find(|(signature, _)| function_name(signature) == name);
     let (_, body) = named(format!("{element}_{routine}_if_ordinary"))
         .or_else(|| named(format!("{element}_{routine}")))
         .expect("the routine was written");
-    if body.split("\n}").next().is_some_and(|body| body.contains("for (")) {
-        return None;
-    }
+    values.has_branches = body.split("\n}").next().is_some_and(|body| body.contains("for ("));
     values.run(&statements(body), HashMap::new());
-    Some(values.counts)
+    values
 }
 
 /// Returns the last word before the arguments.
@@ -243,14 +254,24 @@ fn statements(body: &str) -> Vec<String> {
     body.split(';').map(|statement| statement.trim().to_owned()).filter(|statement| !statement.is_empty()).collect()
 }
 
+/// A function of the shared header.
+#[derive(Clone)]
+struct Function {
+    parameters: Vec<String>,
+    statements: Vec<String>,
+    has_branches: bool,
+}
+
 /// Value numbering of straight-line code.
+#[derive(Default)]
 struct Values {
     /// Begins the names of shared functions.
     prefix: String,
-    functions: HashMap<String, (Vec<String>, Vec<String>)>,
+    functions: HashMap<String, Function>,
     /// Numbers of expressions whose operands are numbers.
     known: HashMap<String, usize>,
     counts: Counts,
+    has_branches: bool,
 }
 
 impl Values {
@@ -294,13 +315,17 @@ impl Values {
         let operands: Vec<usize> = arguments(list).iter().map(|operand| self.value(operand, names)).collect();
         let short = function.strip_prefix(&self.prefix).unwrap_or(function);
         if let Some(&(_, operation)) = OPERATIONS.iter().find(|(name, _)| *name == short) {
-            let (before, key) = (self.known.len(), format!("{operation}{operands:?}"));
+            let (before, key) = (self.known.len(), format!("{short}{operands:?}"));
             let number = self.number(key);
             *self.counts.entry(operation).or_default() += usize::from(self.known.len() > before);
             return number;
         }
-        match self.functions.get(function).cloned().filter(|(_, statements)| !statements.is_empty()) {
-            Some((parameters, statements)) => self.run(&statements, parameters.into_iter().zip(operands).collect()),
+        let function = self.functions.get(function).cloned();
+        self.has_branches |= function.as_ref().is_some_and(|function| function.has_branches);
+        match function.filter(|function| !function.statements.is_empty()) {
+            Some(Function { parameters, statements, .. }) => {
+                self.run(&statements, parameters.into_iter().zip(operands).collect())
+            }
             None => self.number(format!("{short}{operands:?}")),
         }
     }

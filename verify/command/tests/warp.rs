@@ -262,8 +262,7 @@ fn check<S: Bits>(name: &str, elements: impl FnOnce() -> Vec<Interpreted>) -> Op
 
 fn check_points<S: Bits>(name: &str) {
     let elements = || {
-        let all: Vec<Interpreted> =
-            catalogue::elements().iter().map(|entry| interpreted(entry.declaration)).collect();
+        let all: Vec<Interpreted> = catalogue::elements().iter().map(|entry| interpreted(entry.declaration)).collect();
         sufficient(&all).into_iter().map(|number| all[number].clone()).collect()
     };
     assert!(check::<S>(name, elements).is_none_or(|compared| compared > 10_000));

@@ -4,6 +4,7 @@ NAME.inputs has a row for each input: points, velocities, parameters, rest shape
 to FUNCTION.flags.
 """
 
+import os
 import re
 import sys
 from pathlib import Path
@@ -14,8 +15,8 @@ import warp as wp
 import energies
 
 wp.config.quiet = True
-# Kernels compile in a third of the time. Numbers do not depend on the level.
-wp.config.optimization_level = 1
+# Unoptimised kernels compile in a third of the time. Numbers do not depend on the level.
+wp.config.optimization_level = 2 if "ALL_ELEMENTS" in os.environ else 0
 FOLDER = Path(sys.argv[1])
 #: Types of arguments and results. Kernels name them by their number.
 TYPES = []
