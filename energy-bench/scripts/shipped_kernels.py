@@ -163,6 +163,12 @@ def rod(angle):
     return draw
 
 
+def folded(source, constants):
+    """A rod whose ends coincide: its energy is infinite."""
+    x, y = ([source.uniform(-1, 1) for _ in range(3)] for _ in range(2))
+    return x + y + x, [constants[0], 1.0, 0.02]
+
+
 def hinge(angle, off, size):
     """Two triangles that meet at about `angle`. The rest angle is off by `off`."""
 
@@ -189,6 +195,7 @@ LIBUIPC = [
     ("Rod", "angle 1e-6", rod(1e-6)),
     ("Rod", "angle π − 1e-4", rod(math.pi - 1e-4)),
     ("Rod", "straight", rod(0.0)),
+    ("Rod", "folded", folded),
     ("Hinge", "0.3 from rest", hinge(None, 0.3, 1.0)),
     ("Hinge", "1e-6 from rest", hinge(None, 1e-6, 1.0)),
     ("Hinge", "flat, 1e-6 from rest", hinge(0.0, 1e-6, 1.0)),
@@ -213,9 +220,11 @@ def inputs(name, draw, count, seed, number):
         if off:
             rest = dihedral(*points(Dual.variables(x))).value - mpmath.mpf(off[0])
             c[-1] = number(float(rest))
-        exact = truth(name, x, c)
         coordinates.append(x)
         constants.append(c)
+        if draw is folded:
+            continue
+        exact = truth(name, x, c)
         gradients.append(exact.gradient)
         hessians.append(exact.hessian)
     return numpy.array(coordinates), numpy.array(constants), gradients, hessians
@@ -223,6 +232,8 @@ def inputs(name, draw, count, seed, number):
 
 def errors(found, exact, unit):
     """Median and largest error of arrays in units of the last place, as text."""
+    if not exact:
+        return "finite" if numpy.isfinite(found).all() else "not finite, silently"
     all_errors = []
     for f, e in zip(found, exact):
         if not numpy.isfinite(f).all():
@@ -411,7 +422,8 @@ def libuipc(options, table):
                 program, g, h, flags = call(prefix, x, c)
                 program()
                 row += [errors(g, gradients, unit), errors(h, hessians, unit)]
-                assert flags[1] == 0 or prefix == "theirs", "unsettled elements"
+                if prefix != "theirs" and flags[0] == len(x):
+                    row[-2:] = ["flagged", "flagged"]
             assert row[2:4] == row[4:6], "lanes differ from scalars"
             many = -(-options.elements // len(x))
             big = numpy.tile(x, (many, 1)), numpy.tile(c, (many, 1))

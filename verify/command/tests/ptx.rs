@@ -203,7 +203,9 @@ fn instructions(ptx: &str, kernel: &str, precision: &str) -> Counts {
     let mut counts = Counts::new();
     for instruction in body.lines().filter_map(|line| line.split_whitespace().find(|word| word.ends_with(&ending))) {
         let (name, rest) = instruction.split_once('.').expect("it has a type");
-        let name = if name == "sub" { "add" } else { name };
+        // Reciprocals have an instruction of their own, which is rounded like the quotient.
+        let name =
+            [("sub", "add"), ("rcp", "div")].iter().find(|(other, _)| *other == name).map_or(name, |pair| pair.1);
         let Some(&(_, name)) = OPERATIONS.iter().find(|(_, of_ptx)| *of_ptx == name) else { continue };
         assert_eq!(rest, rounded, "{instruction}");
         *counts.entry(name).or_default() += 1;
@@ -219,7 +221,7 @@ fn operations(generated: &Generated, element: &str, routine: &str) -> Values {
     let mut values = Values { prefix, ..Values::default() };
     for (signature, body) in shared.split("\nENERGY_").skip(1).filter_map(|function| function.split_once(" {")) {
         let body = body.split("\n}").next().unwrap_or_default();
-        let has_branches = body.contains("if (") || body.contains("for (");
+        let has_branches = ["if (", "for (", "? energy_"].iter().any(|branch| body.contains(branch));
         let function = Function { parameters: parameters(signature), statements: statements(body), has_branches };
         values.functions.insert(function_name(signature), function);
     }

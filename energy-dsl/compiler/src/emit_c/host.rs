@@ -48,9 +48,10 @@ impl Element<'_> {
             ),
             true => format!(
                 "void {name}_evaluate_lanes(int32_t routine, energy_{precision}_batch *batch) {{\n    \
-                 energy_{precision}_lanes work[{room}];\n    {real} single[{room}];\n    batch->flagged = 0U;\n    \
+                 energy_{precision}_lanes work[{}];\n    {real} single[{room}];\n    batch->flagged = 0U;\n    \
                  batch->unsettled_count = 0U;\n    energy_{precision}_run_lanes(&{name}, {name}_lanes_run, routine, \
-                 batch, work, single);\n}}\n"
+                 batch, work, single);\n}}\n",
+                room + self.largest_written()
             ),
         }
     }
@@ -61,6 +62,13 @@ impl Element<'_> {
         let results = self.functions().iter().map(results).max().unwrap_or_default();
         let Plan { coordinates, parameters, shape, .. } = self.plan;
         coordinates.max(shape) + coordinates + parameters + self.plan.stored() + results
+    }
+
+    /// Returns the count of numbers of the largest result that is written at once: a full matrix, or as returned.
+    fn largest_written(&self) -> usize {
+        let functions = self.functions();
+        let results = functions.iter().flat_map(|function| function.results.iter().map(|result| result.size));
+        results.max().unwrap_or_default().max(self.plan.coordinates.pow(2))
     }
 
     /// Writes a kernel of CUDA for each routine, one element a thread, and a function that launches them.

@@ -54,36 +54,68 @@ ENERGY_FN void @lanes_store_all(const @lanes *numbers, int32_t count, @real *row
     }
 }
 
-/* Writes a result of a vector of elements, if all of its lanes are stored as they are returned. Returns whether they
-   are. */
-ENERGY_FN int @lanes_write(const @result *to, size_t first, int32_t count, const @lanes *numbers) {
+/* Arranges a triangle of 3x3 blocks as a full matrix or as its upper triangle of numbers, row by row. Returns how many
+   numbers that has. */
+ENERGY_FN int32_t @lanes_matrix(int is_full, int32_t n, const @lanes *blocks, @lanes *matrix) {
+    int32_t i, j, row, c;
+    for (i = 0; i < n; i += 3) {
+        for (j = i; j < n; j += 3) {
+            for (row = i; row < i + 3; row++) {
+                const int32_t start = row * n - (is_full ? 0 : row * (row + 1) / 2);
+                for (c = !is_full && i == j ? row : j; c < j + 3; c++) {
+                    matrix[start + c] = blocks[c - j];
+                    if (is_full && i < j) {
+                        matrix[c * n + row] = blocks[c - j];
+                    }
+                }
+                blocks += 3;
+            }
+        }
+    }
+    return is_full ? n * n : n * (n + 1) / 2;
+}
+
+/* Writes a result of a vector of elements. `block` is the number of numbers that have a slot together; `spare` has room
+   for a full matrix, and for the result. */
+ENERGY_FN void @lanes_write(const @result *to, size_t first, int32_t count, int32_t block, int32_t coordinates,
+                            const @lanes *numbers, @lanes *spare) {
     @real *place = to->numbers + first * to->per_element;
     int32_t j, lane;
+    if (to->numbers == NULL) {
+        return;
+    }
+    if (to->layout == ENERGY_ADDED || to->layout == ENERGY_STORED) {
+        @real *rows = (@real *)(void *)spare;
+        @lanes_store_all(numbers, count, rows, (size_t)count);
+        for (lane = 0; lane < @LANES; lane++) {
+            @write(to, first + (size_t)lane, count, block, coordinates, rows + lane * count);
+        }
+        return;
+    }
     if (to->layout != ENERGY_AS_RETURNED) {
-        return 0;
+        count = @lanes_matrix(to->layout == ENERGY_FULL, coordinates, numbers, spare);
+        numbers = spare;
     }
     if (to->per_number == 1U && count > 1) {
         @lanes_store_all(numbers, count, place, to->per_element);
-        return 1;
-    }
-    if (to->per_element == 1U) {
+    } else if (to->per_element == 1U) {
         for (j = 0; j < count; j++) {
             @lanes_store(numbers[j], place + (size_t)j * to->per_number);
         }
-        return 1;
-    }
-    for (lane = 0; lane < @LANES; lane++) {
-        @real *row = place + (size_t)lane * to->per_element;
-        const @real *from = (const @real *)(const void *)numbers + lane;
-        for (j = 0; j < count; j++) {
-            row[(size_t)j * to->per_number] = from[(size_t)j * @LANES];
+    } else {
+        for (lane = 0; lane < @LANES; lane++) {
+            @real *row = place + (size_t)lane * to->per_element;
+            const @real *from = (const @real *)(const void *)numbers + lane;
+            for (j = 0; j < count; j++) {
+                row[(size_t)j * to->per_number] = from[(size_t)j * @LANES];
+            }
         }
     }
-    return 1;
 }
 
-/* Runs a routine of an element on many elements. `work` has room for all inputs and results of one vector of elements,
-   `single` for those of one element. Results are written or added in the order of the elements. */
+/* Runs a routine of an element on many elements. `work` has room for all inputs and results of one vector of elements
+   and for what is written of one result, `single` for inputs and results of one element. Results are written or added
+   in the order of the elements. */
 ENERGY_FN void @run_lanes(const @element *element, @lanes_run *run, int32_t routine, @batch *batch, @lanes *work,
                           @real *single) {
     /* Rest shapes and single vertices are computed one at a time: each vector would need one vertex for all its elements. */
@@ -98,7 +130,6 @@ ENERGY_FN void @run_lanes(const @element *element, @lanes_run *run, int32_t rout
     const size_t whole = is_single ? 0U : batch->count - batch->count % @LANES;
     size_t first;
     int32_t place, j, lane;
-    int is_written[3];
     results[0] = stored + element->stored;
     results[1] = results[0] + sizes[0];
     results[2] = results[1] + sizes[1];
@@ -117,11 +148,11 @@ ENERGY_FN void @run_lanes(const @element *element, @lanes_run *run, int32_t rout
         }
         @lanes_read(&batch->stored, first, element->stored, stored);
         rare = run(routine, arguments, results);
-        for (place = 0; place < 3; place++) {
-            is_written[place] = batch->results[place].numbers == NULL ||
-                                @lanes_write(&batch->results[place], first, sizes[place], results[place]);
-        }
-        if (rare == 0U && is_written[0] && is_written[1] && is_written[2]) {
+        if (rare == 0U) {
+            for (place = 0; place < 3; place++) {
+                @lanes_write(&batch->results[place], first, sizes[place], @slot_size(routine, place, sizes[place]),
+                             element->coordinates, results[place], results[2] + sizes[2]);
+            }
             if (batch->flags != NULL) {
                 memset(batch->flags + first, 0, @LANES);
             }
@@ -133,13 +164,11 @@ ENERGY_FN void @run_lanes(const @element *element, @lanes_run *run, int32_t rout
                 continue;
             }
             for (place = 0; place < 3; place++) {
-                if (!is_written[place]) {
-                    for (j = 0; j < sizes[place]; j++) {
-                        single[j] = results[place][j][lane];
-                    }
-                    @write(&batch->results[place], first + (size_t)lane, sizes[place],
-                           @slot_size(routine, place, sizes[place]), element->coordinates, single);
+                for (j = 0; j < sizes[place]; j++) {
+                    single[j] = results[place][j][lane];
                 }
+                @write(&batch->results[place], first + (size_t)lane, sizes[place],
+                       @slot_size(routine, place, sizes[place]), element->coordinates, single);
             }
             if (batch->flags != NULL) {
                 batch->flags[first + (size_t)lane] = 0U;

@@ -74,37 +74,60 @@ ENERGY_FN void @read_points(const @batch *batch, const @column *from, size_t ele
     }
 }
 
+/* Writes a triangle of 3x3 blocks as a full matrix or as its upper triangle of numbers, row by row. */
+ENERGY_FN void @write_matrix(const @result *to, size_t element, int32_t n, const @real *blocks) {
+    @real *matrix = to->numbers + element * to->per_element;
+    const int is_full = to->layout == ENERGY_FULL;
+    int32_t i, j, row, c;
+    for (i = 0; i < n; i += 3) {
+        for (j = i; j < n; j += 3) {
+            for (row = i; row < i + 3; row++) {
+                /* A triangle lacks what stands before the diagonal in this row and in those above. */
+                const int32_t start = row * n - (is_full ? 0 : row * (row + 1) / 2);
+                for (c = !is_full && i == j ? row : j; c < j + 3; c++) {
+                    const @real number = blocks[c - j];
+                    matrix[(size_t)(start + c) * to->per_number] = number;
+                    if (is_full && i < j) {
+                        matrix[(size_t)(c * n + row) * to->per_number] = number;
+                    }
+                }
+                blocks += 3;
+            }
+        }
+    }
+}
+
 /* Writes or adds a result of an element. `block` is the number of numbers that have a slot together. */
 ENERGY_FN void @write(const @result *to, size_t element, int32_t count, int32_t block, int32_t coordinates,
                       const @real *numbers) {
-    int32_t row, column, j = 0;
+    int32_t j, n;
+    size_t number;
     if (to->numbers == NULL) {
         return;
     }
     switch (to->layout) {
     case ENERGY_FULL:
     case ENERGY_TRIANGLE:
-        for (row = 0; row < coordinates; row++) {
-            for (column = to->layout == ENERGY_FULL ? 0 : row; column < coordinates; column++) {
-                to->numbers[element * to->per_element + (size_t)j * to->per_number] =
-                    numbers[@in_blocks(coordinates / 3, row, column)];
-                j++;
-            }
-        }
+        @write_matrix(to, element, coordinates, numbers);
         break;
     case ENERGY_ADDED:
     case ENERGY_STORED:
-        for (j = 0; j < count; j++) {
-            const uint32_t slot = to->slots[element * to->per_element + (size_t)(j / block)];
-            if (slot != ENERGY_NO_SLOT) {
-                @real *place = to->numbers + (size_t)slot * (size_t)block + (size_t)(j % block);
+        number = element * to->per_element;
+        for (j = 0; j < count; j += block) {
+            const uint32_t slot = to->slots[number];
+            @real *place = to->numbers + (size_t)slot * (size_t)block;
+            number++;
+            if (slot == ENERGY_NO_SLOT) {
+                continue;
+            }
+            for (n = 0; n < block; n++) {
                 if (to->layout == ENERGY_STORED) {
-                    *place = numbers[j];
+                    place[n] = numbers[j + n];
                 } else {
 #if defined(__CUDA_ARCH__)
-                    atomicAdd(place, numbers[j]);
+                    atomicAdd(place + n, numbers[j + n]);
 #else
-                    *place = *place + numbers[j];
+                    place[n] = place[n] + numbers[j + n];
 #endif
                 }
             }

@@ -8,9 +8,20 @@ ENERGY_FN int32_t @in_blocks(int32_t points, int32_t row, int32_t column) {
 /* Writes a triangle of 3x3 blocks as a full matrix, row by row. */
 ENERGY_FN void @full_matrix(int32_t points, const @real *triangle, @real *matrix) {
     const int32_t n = 3 * points;
-    int32_t i;
-    for (i = 0; i < n * n; i++) {
-        matrix[i] = triangle[@in_blocks(points, i / n, i % n)];
+    const @real *block = triangle;
+    int32_t i, j, r, c;
+    for (i = 0; i < n; i += 3) {
+        for (j = i; j < n; j += 3) {
+            for (r = 0; r < 3; r++) {
+                for (c = 0; c < 3; c++) {
+                    matrix[(i + r) * n + j + c] = block[3 * r + c];
+                    if (i < j) {
+                        matrix[(j + c) * n + i + r] = block[3 * r + c];
+                    }
+                }
+            }
+            block += 9;
+        }
     }
 }
 
