@@ -5,16 +5,16 @@
     verify emit shipped_kernels.energy --lang warp --precision f32 -o WARP
     python3 shipped_kernels.py --c C --libuipc LIBUIPC --eigen EIGEN --warp WARP --newton NEWTON
 
-`LIBUIPC` and `NEWTON` are checkouts of these projects, `EIGEN` is the folder that contains `Eigen/`. Without the options
-of one of them, its rows are left out. Nothing is changed in the checkouts.
+`LIBUIPC` and `NEWTON` are checkouts of these projects, `EIGEN` is the folder that contains `Eigen/`. Without the
+options of one of them, its rows are left out. Nothing is changed in the checkouts.
 
 - libuipc (f64): its headers and the generated C are compiled into one program, `-O3 -march=native`.
 - Newton (f32): its functions and the generated ones run in kernels of Warp on the CPU, vertex by vertex.
 
-The truth are second-order duals over numbers of 60 digits (mpmath), from the same inputs. An error is the largest
-difference of an array divided by its largest number, in units of the last place, u = 2^-53 or 2^-24: the median and the
-largest of all inputs of a case. `NaN` stands where a result is not finite. Times are medians of repeated runs in turns, in ns
-per element, or per vertex for Newton.
+The truth comes from the same inputs by second-order duals over numbers of 60 digits (mpmath). An error is the largest
+difference of an array divided by its largest number, in units of roundoff, u = 2^-53 or 2^-24: the median and the
+largest of all inputs of a case. `NaN` stands where a result is not finite. Times are medians of repeated runs in turns,
+in ns per element, or per vertex for Newton.
 """
 
 import argparse
@@ -110,7 +110,7 @@ def length(a):
 
 
 def dihedral(x0, x1, x2, x3):
-    """The angle of the triangles x0 x2 x3 and x1 x2 x3: 2 atan2(|(n1 x n2).E|, ...) of the half angle, by its tangent."""
+    """The angle of the triangles x0 x2 x3 and x1 x2 x3, by the tangent of its half."""
     edge = sub(x3, x2)
     n1, n2 = cross(sub(x2, x0), sub(x3, x0)), cross(sub(x3, x1), sub(x2, x1))
     sine = dot(cross(n1, n2), edge) * length(edge).reciprocal()
@@ -207,7 +207,13 @@ NEWTON = [
     ("Bending", "1e-3 from rest", hinge(None, 1e-3, 1.0)),
     ("Bending", "edges of 1 mm", hinge(None, 0.3, 1e-3)),
 ]
-CONSTANTS = {"Spring": [100.0], "ParticleSpring": [100.0], "Rod": [1e6], "Hinge": [1e-3, 1.0, 0.5], "Bending": [1e-3, 1.0]}
+CONSTANTS = {
+    "Spring": [100.0],
+    "ParticleSpring": [100.0],
+    "Rod": [1e6],
+    "Hinge": [1e-3, 1.0, 0.5],
+    "Bending": [1e-3, 1.0],
+}
 
 
 def inputs(name, draw, count, seed, number):
@@ -381,7 +387,8 @@ def compile_libuipc(options, folder):
             source = os.path.join(options.c, source)
             subprocess.run([options.cc, "-std=gnu99", *flags, "-c", source, "-o", objects[-1]], check=True)
     kernels = os.path.join(folder, "kernels.cpp")
-    subprocess.run([options.cxx, "-std=c++20", "-shared", *flags, *include, kernels, *objects, "-o", library], check=True)
+    flags = ["-std=c++20", "-shared", *flags, *include]
+    subprocess.run([options.cxx, *flags, kernels, *objects, "-o", library], check=True)
     return ctypes.CDLL(library)
 
 
@@ -540,8 +547,8 @@ def main():
         libuipc(options, table)
     if options.warp:
         newton(options, table)
-    print("| kernel, case | gradient, theirs | generated | Hessian, theirs | generated | ns: theirs, generated (, lanes) |")
-    print("|---|---|---|---|---|---|")
+    heads = "kernel, case", "gradient, theirs", "generated", "Hessian, theirs", "generated", "ns: both, in vectors"
+    print("| " + " | ".join(heads) + " |\n" + "|---" * len(heads) + "|")
     for row in table:
         print("| " + " | ".join(row) + " |")
 

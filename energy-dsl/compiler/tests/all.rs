@@ -2,6 +2,7 @@
 #![allow(missing_docs)]
 
 mod golden;
+mod growth;
 mod language;
 mod random;
 mod range;

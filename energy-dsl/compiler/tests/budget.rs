@@ -12,7 +12,6 @@ use energy_compiler::{Budget, Interpreted, Limits, Phase, Textbook, compile, com
 use proc_macro2::Span;
 use random::Random;
 
-mod growth;
 mod random;
 
 /// Longest time of a text. Processors differ by a factor of two: most take half of it.

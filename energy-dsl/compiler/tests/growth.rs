@@ -1,5 +1,5 @@
 //! Operations and compile time grow polynomially with the size of a formula. The test prints the curve:
-//! `cargo test --release -p energy-compiler --test budget growth -- --nocapture`.
+//! `cargo test --release -p energy-compiler --test all growth -- --nocapture`.
 
 use std::fmt::Write as _;
 use std::time::{Duration, Instant};
