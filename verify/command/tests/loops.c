@@ -122,6 +122,93 @@ static int rest_is_same(int32_t e, size_t count, const REAL *rest, const REAL *p
     return are_same;
 }
 
+/* Place of an entry of a symmetric matrix in its triangle of 3x3 blocks. */
+static size_t in_blocks(size_t points, size_t row, size_t column) {
+    const size_t i = row / 3U < column / 3U ? row / 3U : column / 3U, j = row / 3U < column / 3U ? column / 3U : row / 3U;
+    const size_t r = row / 3U <= column / 3U ? row % 3U : column % 3U, c = row / 3U <= column / 3U ? column % 3U : row % 3U;
+    return 9U * (i * points - i * (i + 1U) / 2U + j) + 3U * r + c;
+}
+
+/* What a result of all elements is in a layout, from what single elements return. Slots have `block` numbers each: one of
+   their own for each element, counted from the end, if they are stored; the same for all elements if they are added. */
+static void arrange(enum energy_layout layout, size_t elements_count, size_t n, size_t count, size_t block,
+                    const REAL *returned, REAL *expected) {
+    const size_t slots = elements_count * (count / block);
+    size_t i, j, row, column;
+    for (i = 0; i < elements_count; i++) {
+        const REAL *of_one = returned + i * count;
+        if (layout == ENERGY_STORED || layout == ENERGY_ADDED) {
+            for (j = 0; j < count; j++) {
+                const size_t slot = layout == ENERGY_ADDED ? j / block : slots - 1U - (i * (count / block) + j / block);
+                REAL *place = expected + slot * block + j % block;
+                *place = layout == ENERGY_ADDED ? *place + of_one[j] : of_one[j];
+            }
+        } else if (count == n * (n + 3U) / 2U) {
+            REAL *place = expected + i * n * n;
+            for (row = 0; row < n; row++) {
+                for (column = layout == ENERGY_FULL ? 0U : row; column < n; column++) {
+                    *place++ = of_one[in_blocks(n / 3U, row, column)];
+                }
+            }
+        } else {
+            memcpy(expected + i * n * n, of_one, count * sizeof *of_one);
+        }
+    }
+}
+
+/* Compares all layouts of a routine with arranged results of single elements. All results have the same layout, those too
+   that the routine lacks. Returns whether they are the same. */
+static int layouts_are_same(int32_t e, int32_t routine, BATCH batch, REAL *const returned[3]) {
+    static const enum energy_layout layouts[4] = {ENERGY_FULL, ENERGY_TRIANGLE, ENERGY_STORED, ENERGY_ADDED};
+    const int32_t *counts = elements[e]->sizes[routine];
+    const size_t n = (size_t)elements[e]->coordinates;
+    const int order = routine == ENERGY_HESSIAN_VECTOR || routine == ENERGY_FORCE || routine == ENERGY_JACOBIANS ? 1 : 0;
+    int l, way, k, are_same = 1;
+    batch.flags = NULL;
+    for (l = 0; l < 4; l++) {
+        for (way = 0; way < 2; way++) {
+            REAL *found[3], *expected[3];
+            uint32_t *slots[3];
+            size_t sizes[3];
+            for (k = 0; k < 3; k++) {
+                const size_t count = (size_t)counts[k];
+                const size_t block =
+                    order + k == 0 || count % 3U != 0U ? 1U : (order + k == 1 || count % 9U != 0U ? 3U : 9U);
+                const size_t own = count / block, all = batch.count * own;
+                size_t slot;
+                sizes[k] = batch.count * (n * n > count ? n * n : count);
+                found[k] = numbers(sizes[k]);
+                expected[k] = numbers(sizes[k]);
+                slots[k] = (uint32_t *)calloc(all + 1U, sizeof *slots[k]);
+                for (slot = 0; slot < all; slot++) {
+                    slots[k][slot] = (uint32_t)(layouts[l] == ENERGY_ADDED ? slot % own : all - 1U - slot);
+                }
+                batch.results[k].numbers = found[k];
+                batch.results[k].layout = layouts[l];
+                batch.results[k].slots = slots[k];
+                batch.results[k].per_element = layouts[l] == ENERGY_ADDED || layouts[l] == ENERGY_STORED ? own : n * n;
+                batch.results[k].per_number = 1U;
+                if (batch.results[k].per_element >= count || layouts[l] == ENERGY_ADDED || layouts[l] == ENERGY_STORED) {
+                    arrange(layouts[l], batch.count, n, count, block, returned[k], expected[k]);
+                } else {
+                    batch.results[k].numbers = NULL; /* More numbers than a full matrix has. */
+                }
+            }
+            (way == 0 ? plain : in_lanes)[e](routine, &batch);
+            for (k = 0; k < 3; k++) {
+                if (!same(expected[k], found[k], sizes[k])) {
+                    printf("layout %d, result %d, way %d: ", (int)layouts[l], k, way);
+                    are_same = 0;
+                }
+                free(found[k]);
+                free(expected[k]);
+                free(slots[k]);
+            }
+        }
+    }
+    return are_same;
+}
+
 int main(int argc, char **argv) {
     const size_t most = 4096;
     FILE *file = fopen(argv[argc - 1], "rb");
@@ -209,6 +296,10 @@ int main(int argc, char **argv) {
                     printf("%s, routine %d, way %d: other flags\n", element->name, routine, way);
                     return 1;
                 }
+            }
+            if (!layouts_are_same(e, routine, batch, of_each)) {
+                printf("%s, routine %d: other bits\n", element->name, routine);
+                return 1;
             }
             compared += good;
             for (k = 0; k < 3; k++) {

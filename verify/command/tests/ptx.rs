@@ -35,9 +35,9 @@ fn ptx_has_the_operations_of_the_plan() {
         return;
     };
     let elements = KERNELS.map(|(name, _)| interpreted(name));
-    let generated = Generated::new("ptx", &elements, Precision::Single);
+    let generated = Generated::new("ptx", &elements);
     for (name, (element, routine)) in generated.names.iter().zip(KERNELS) {
-        let ptx = generated.ptx(&nvcc, name, "sm_80");
+        let ptx = generated.ptx(&nvcc, name);
         let Counted { found, expected, .. } = generated.counts(name, routine, &ptx);
         println!("{element}, {routine}: {found:?}");
         assert_eq!(found, expected, "{element}, {routine}");
@@ -56,10 +56,10 @@ fn ptx_of_all_elements_has_the_operations_of_the_plan() {
     let text = include_str!("../../tests/unknowns.energy");
     let mixed = Interpreted::from_file(text, "unknowns.energy").expect("it compiles");
     let elements: Vec<Interpreted> = named.chain(mixed).collect();
-    let generated = Generated::new("ptx-f32", &elements, Precision::Single);
+    let generated = Generated::new("ptx-all", &elements);
     let (mut equal, mut repeated, mut different) = (0, 0, Vec::new());
     for name in &generated.names {
-        let ptx = generated.ptx(&nvcc, name, "sm_80");
+        let ptx = generated.ptx(&nvcc, name);
         for routine in generated.routines(name) {
             let Counted { found, expected, has_branches } = generated.counts(name, &routine, &ptx);
             // What follows a branch may be compiled once for each of its ways.
@@ -77,26 +77,24 @@ fn ptx_of_all_elements_has_the_operations_of_the_plan() {
     assert!(different.is_empty() && equal > 10 * repeated, "{different:#?}");
 }
 
-/// Generated CUDA in a folder.
+/// Generated CUDA in single precision, in a folder.
 struct Generated {
     folder: PathBuf,
-    precision: &'static str,
     files: Vec<SourceFile>,
     /// Elements, as files name them.
     names: Vec<String>,
 }
 
 impl Generated {
-    fn new(name: &str, elements: &[Interpreted], precision: Precision) -> Self {
+    fn new(name: &str, elements: &[Interpreted]) -> Self {
         let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
         std::fs::create_dir_all(&folder).unwrap();
-        let files = sources(elements, Target::Cuda, &[precision]).unwrap();
+        let files = sources(elements, Target::Cuda, &[Precision::Single]).unwrap();
         for file in &files {
             std::fs::write(folder.join(&file.name), &file.text).unwrap();
         }
         let names = files.iter().filter_map(|file| Some(file.name.strip_suffix(".cu")?.to_owned())).collect();
-        let precision = if precision == Precision::Single { "f32" } else { "f64" };
-        Self { folder, precision, files, names }
+        Self { folder, files, names }
     }
 
     fn text(&self, name: &str) -> &str {
@@ -104,14 +102,14 @@ impl Generated {
     }
 
     /// Compiles an element. Fused operations are allowed: intrinsics are not to be contracted.
-    fn ptx(&self, nvcc: &Path, element: &str, architecture: &str) -> String {
+    fn ptx(&self, nvcc: &Path, element: &str) -> String {
         let [source, ptx] = ["cu", "ptx"].map(|ending| self.folder.join(format!("{element}.{ending}")));
         let mut command = Command::new(nvcc);
-        command.args(["-ptx", "-Werror", "all-warnings", &format!("-arch={architecture}")]);
+        command.args(["-ptx", "-Werror", "all-warnings", "-arch=sm_80"]);
         let output = command.arg(source).arg("-o").arg(&ptx).output().unwrap();
         assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
         let ptx = std::fs::read_to_string(ptx).unwrap();
-        assert!(self.precision == "f64" || !ptx.contains(".f64"), "{element}: double precision");
+        assert!(!ptx.contains(".f64"), "{element}: double precision");
         ptx
     }
 
@@ -130,7 +128,7 @@ impl Generated {
     }
 
     fn counts(&self, element: &str, routine: &str, ptx: &str) -> Counted {
-        let found = instructions(ptx, &format!("{element}_{routine}_kernel"), self.precision);
+        let found = instructions(ptx, &format!("{element}_{routine}_kernel"));
         let Values { counts: expected, has_branches, .. } = operations(self, element, routine);
         Counted { found, expected, has_branches }
     }
@@ -192,20 +190,17 @@ fn interpreted(name: &str) -> Interpreted {
 }
 
 /// Counts the instructions of a kernel. Each is rounded to nearest; sums in memory have no rounding of their own.
-fn instructions(ptx: &str, kernel: &str, precision: &str) -> Counts {
+fn instructions(ptx: &str, kernel: &str) -> Counts {
     // The name goes on with the length and the name of the argument's type.
     let begin = ["16energy", "22energy"].iter().find_map(|argument| ptx.find(&format!("{kernel}{argument}")));
     let body = &ptx[begin.expect("PTX has the kernel")..];
     let body = &body[..body.find("\n}").expect("the kernel ends")];
-    let (ending, rounded) = (format!(".{precision}"), format!("rn.{precision}"));
     let mut counts = Counts::new();
-    for instruction in body.lines().filter_map(|line| line.split_whitespace().find(|word| word.ends_with(&ending))) {
+    for instruction in body.lines().filter_map(|line| line.split_whitespace().find(|word| word.ends_with(".f32"))) {
         let (name, rest) = instruction.split_once('.').expect("it has a type");
-        // Reciprocals have an instruction of their own, which is rounded like the quotient.
-        let name =
-            [("sub", "add"), ("rcp", "div")].iter().find(|(other, _)| *other == name).map_or(name, |pair| pair.1);
+        let name = if name == "sub" { "add" } else { name };
         let Some(&(_, name)) = OPERATIONS.iter().find(|(_, of_ptx)| *of_ptx == name) else { continue };
-        assert_eq!(rest, rounded, "{instruction}");
+        assert_eq!(rest, "rn.f32", "{instruction}");
         *counts.entry(name).or_default() += 1;
     }
     counts
@@ -213,10 +208,8 @@ fn instructions(ptx: &str, kernel: &str, precision: &str) -> Counts {
 
 /// Counts the operations of a routine in the generated text. Equal ones with equal operands count once.
 fn operations(generated: &Generated, element: &str, routine: &str) -> Values {
-    let precision = generated.precision;
-    let (shared, own) = (generated.text(&format!("energy_{precision}.h")), generated.text(&format!("{element}.h")));
-    let prefix = format!("energy_{precision}_");
-    let mut values = Values { prefix, ..Values::default() };
+    let (shared, own) = (generated.text("energy_f32.h"), generated.text(&format!("{element}.h")));
+    let mut values = Values::default();
     for (signature, body) in shared.split("\nENERGY_").skip(1).filter_map(|function| function.split_once(" {")) {
         let body = body.split("\n}").next().unwrap_or_default();
         let has_branches = ["if (", "for (", "? energy_"].iter().any(|branch| body.contains(branch));
@@ -265,8 +258,6 @@ struct Function {
 /// Value numbering of straight-line code.
 #[derive(Default)]
 struct Values {
-    /// Begins the names of shared functions.
-    prefix: String,
     functions: HashMap<String, Function>,
     /// Numbers of expressions whose operands are numbers.
     known: HashMap<String, usize>,
@@ -308,12 +299,12 @@ impl Values {
                 let name = word.trim_end_matches(|c: char| !(c.is_alphanumeric() || c == '_'));
                 names.get(name).map_or_else(|| word.to_owned(), |number| word.replace(name, &format!("#{number}")))
             });
-            let has = |(name, _): &(&str, &str)| text.contains(&format!("{}{name}(", self.prefix));
+            let has = |(name, _): &(&str, &str)| text.contains(&format!("energy_f32_{name}("));
             assert!(!OPERATIONS.iter().any(has), "operations inside of another expression: {text}");
             return self.number(key.collect());
         };
         let operands: Vec<usize> = arguments(list).iter().map(|operand| self.value(operand, names)).collect();
-        let short = function.strip_prefix(&self.prefix).unwrap_or(function);
+        let short = function.trim_start_matches("energy_f32_");
         if let Some(&(_, operation)) = OPERATIONS.iter().find(|(name, _)| *name == short) {
             let (before, key) = (self.known.len(), format!("{short}{operands:?}"));
             let number = self.number(key);

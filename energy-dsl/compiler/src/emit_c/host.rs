@@ -51,7 +51,7 @@ impl Element<'_> {
                  energy_{precision}_lanes work[{}];\n    {real} single[{room}];\n    batch->flagged = 0U;\n    \
                  batch->unsettled_count = 0U;\n    energy_{precision}_run_lanes(&{name}, {name}_lanes_run, routine, \
                  batch, work, single);\n}}\n",
-                room + self.largest_written()
+                room + self.largest_result()
             ),
         }
     }
@@ -64,11 +64,10 @@ impl Element<'_> {
         coordinates.max(shape) + coordinates + parameters + self.plan.stored() + results
     }
 
-    /// Returns the count of numbers of the largest result that is written at once: a full matrix, or as returned.
-    fn largest_written(&self) -> usize {
-        let functions = self.functions();
-        let results = functions.iter().flat_map(|function| function.results.iter().map(|result| result.size));
-        results.max().unwrap_or_default().max(self.plan.coordinates.pow(2))
+    /// Returns the count of numbers of the largest result.
+    fn largest_result(&self) -> usize {
+        let sizes = |function: Function| function.results.into_iter().map(|result| result.size);
+        self.functions().into_iter().flat_map(sizes).max().unwrap_or_default()
     }
 
     /// Writes a kernel of CUDA for each routine, one element a thread, and a function that launches them.

@@ -54,61 +54,27 @@ ENERGY_FN void @lanes_store_all(const @lanes *numbers, int32_t count, @real *row
     }
 }
 
-/* Arranges a triangle of 3x3 blocks as a full matrix or as its upper triangle of numbers, row by row. Returns how many
-   numbers that has. */
-ENERGY_FN int32_t @lanes_matrix(int is_full, int32_t n, const @lanes *blocks, @lanes *matrix) {
-    int32_t i, j, row, c;
-    for (i = 0; i < n; i += 3) {
-        for (j = i; j < n; j += 3) {
-            for (row = i; row < i + 3; row++) {
-                const int32_t start = row * n - (is_full ? 0 : row * (row + 1) / 2);
-                for (c = !is_full && i == j ? row : j; c < j + 3; c++) {
-                    matrix[start + c] = blocks[c - j];
-                    if (is_full && i < j) {
-                        matrix[c * n + row] = blocks[c - j];
-                    }
-                }
-                blocks += 3;
-            }
-        }
-    }
-    return is_full ? n * n : n * (n + 1) / 2;
-}
-
 /* Writes a result of a vector of elements. `block` is the number of numbers that have a slot together; `spare` has room
-   for a full matrix, and for the result. */
+   for the result. */
 ENERGY_FN void @lanes_write(const @result *to, size_t first, int32_t count, int32_t block, int32_t coordinates,
                             const @lanes *numbers, @lanes *spare) {
-    @real *place = to->numbers + first * to->per_element;
+    @real *place;
     int32_t j, lane;
-    if (to->numbers == NULL) {
+    if (to->numbers == NULL || count == 0) {
         return;
     }
-    if (to->layout == ENERGY_ADDED || to->layout == ENERGY_STORED) {
-        @real *rows = (@real *)(void *)spare;
-        @lanes_store_all(numbers, count, rows, (size_t)count);
-        for (lane = 0; lane < @LANES; lane++) {
-            @write(to, first + (size_t)lane, count, block, coordinates, rows + lane * count);
-        }
-        return;
-    }
-    if (to->layout != ENERGY_AS_RETURNED) {
-        count = @lanes_matrix(to->layout == ENERGY_FULL, coordinates, numbers, spare);
-        numbers = spare;
-    }
-    if (to->per_number == 1U && count > 1) {
+    place = to->numbers + first * to->per_element;
+    if (to->layout == ENERGY_AS_RETURNED && to->per_number == 1U && count > 1) {
         @lanes_store_all(numbers, count, place, to->per_element);
-    } else if (to->per_element == 1U) {
+    } else if (to->layout == ENERGY_AS_RETURNED && to->per_element == 1U) {
         for (j = 0; j < count; j++) {
             @lanes_store(numbers[j], place + (size_t)j * to->per_number);
         }
     } else {
+        @real *rows = (@real *)(void *)spare;
+        @lanes_store_all(numbers, count, rows, (size_t)count);
         for (lane = 0; lane < @LANES; lane++) {
-            @real *row = place + (size_t)lane * to->per_element;
-            const @real *from = (const @real *)(const void *)numbers + lane;
-            for (j = 0; j < count; j++) {
-                row[(size_t)j * to->per_number] = from[(size_t)j * @LANES];
-            }
+            @write(to, first + (size_t)lane, count, block, coordinates, rows + lane * count);
         }
     }
 }

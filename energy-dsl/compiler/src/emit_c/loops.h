@@ -11,9 +11,9 @@ typedef struct {
 enum energy_layout {
     /* As the routine returns it. */
     ENERGY_AS_RETURNED,
-    /* A triangle of 3x3 blocks as the full matrix, row by row. */
+    /* A triangle of 3x3 blocks as the full matrix, row by row. Other results are stored as returned. */
     ENERGY_FULL,
-    /* A triangle of 3x3 blocks as the upper triangle of numbers, row by row. */
+    /* A triangle of 3x3 blocks as the upper triangle of numbers, row by row; others as returned. */
     ENERGY_TRIANGLE,
     /* Added: number j to numbers[slots[i * per_element + j / block] * block + j % block], where a block has three numbers
        of a gradient, nine of a Hessian, or one. ENERGY_NO_SLOT leaves a block out. */
@@ -100,19 +100,13 @@ ENERGY_FN void @write_matrix(const @result *to, size_t element, int32_t n, const
 /* Writes or adds a result of an element. `block` is the number of numbers that have a slot together. */
 ENERGY_FN void @write(const @result *to, size_t element, int32_t count, int32_t block, int32_t coordinates,
                       const @real *numbers) {
-    int32_t j, n;
     size_t number;
+    int32_t j, n;
     if (to->numbers == NULL) {
         return;
     }
-    switch (to->layout) {
-    case ENERGY_FULL:
-    case ENERGY_TRIANGLE:
-        @write_matrix(to, element, coordinates, numbers);
-        break;
-    case ENERGY_ADDED:
-    case ENERGY_STORED:
-        number = element * to->per_element;
+    number = element * to->per_element;
+    if (to->layout == ENERGY_ADDED || to->layout == ENERGY_STORED) {
         for (j = 0; j < count; j += block) {
             const uint32_t slot = to->slots[number];
             @real *place = to->numbers + (size_t)slot * (size_t)block;
@@ -132,13 +126,12 @@ ENERGY_FN void @write(const @result *to, size_t element, int32_t count, int32_t 
                 }
             }
         }
-        break;
-    case ENERGY_AS_RETURNED:
-    default:
+    } else if (to->layout != ENERGY_AS_RETURNED && count == coordinates * (coordinates + 3) / 2) {
+        @write_matrix(to, element, coordinates, numbers);
+    } else {
         for (j = 0; j < count; j++) {
-            to->numbers[element * to->per_element + (size_t)j * to->per_number] = numbers[j];
+            to->numbers[number + (size_t)j * to->per_number] = numbers[j];
         }
-        break;
     }
 }
 
