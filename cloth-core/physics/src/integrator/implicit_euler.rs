@@ -169,34 +169,3 @@ impl Integrator for ImplicitEuler {
         Ok(None)
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use energy_elements::{HookeSpring, ViscousDrag};
-    use energy_solve::{ElementList, ForceTerm, PotentialTerm, System};
-
-    use super::*;
-
-    /// Forces of springs without rest length and of drag are linear: their linearised step is the implicit one.
-    #[test]
-    fn a_step_under_linear_forces_solves_the_implicit_equations() {
-        let springs = vec![HookeSpring::new(40.0, 0.0), HookeSpring::new(25.0, 0.0)];
-        let springs = PotentialTerm::new(ElementList::new("springs", springs, &[[0, 1], [1, 2]]).unwrap());
-        let drag = vec![ViscousDrag::new(3.0), ViscousDrag::new(5.0)];
-        let drag = ForceTerm::new(ElementList::new("drag", drag, &[[1], [2]]).unwrap());
-        let system = System::new(vec![Box::new(springs), Box::new(drag)], &[true, false, false]).unwrap();
-        let x = vec![[0.0; 3], [1.0, 0.2, 0.0], [1.5, -0.4, 0.7]];
-        let v = vec![[0.1, 0.0, -0.2], [0.0, 3.0, 1.0], [1.0, -2.0, 0.5]];
-        let mut body = Body { x, v: v.clone(), masses: vec![1.0, 2.0, 3.0], system };
-        let dt = 0.1;
-        let mut scheme = ImplicitEuler::with_options(SolveOptions::new(1e-13));
-        scheme.step(&mut body, dt).unwrap();
-        let force = body.system.forces(State { x: &body.x, v: &body.v }).unwrap();
-        for vertex in [1, 2] {
-            for axis in 0..3 {
-                let gained = body.masses[vertex] * (body.v[vertex][axis] - v[vertex][axis]);
-                assert!((gained - dt * force[vertex][axis]).abs() < 1e-11, "vertex {vertex}: {gained} N s");
-            }
-        }
-    }
-}

@@ -27,5 +27,3 @@ mod term;
 
 pub(super) use split::{moduli_at_rest, plain_moduli, tensile_stiffness};
 pub(super) use term::{NodalMembrane, RestShapes, mean_edge};
-#[cfg(test)]
-mod tests;

@@ -25,8 +25,6 @@ mod friction;
 mod patch;
 mod rigidity;
 mod term;
-#[cfg(test)]
-mod tests;
 mod tilt;
 
 pub use rigidity::{Rigidity, RigidityError};

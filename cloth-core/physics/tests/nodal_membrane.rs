@@ -1,10 +1,10 @@
 use energy_dsl::Vector3;
 use energy_solve::{BlockMatrix, Curvature, LinearisationOptions, State, System, Weights};
 
-use crate::fabric::{
+use cloth_physics::fabric::{
     Arap, BaraffWitkin, Bending, Fabric, Material, Membrane, Rigidity, Strain, Surroundings, Woven, terms,
 };
-use crate::mesh::{Diagonals, Plane, Sheet, SpringNetwork, TriangleMesh};
+use cloth_physics::mesh::{Diagonals, Plane, Sheet, SpringNetwork, TriangleMesh};
 
 const NOTHING: Surroundings = Surroundings { gravity: [0.0; 3], drag: 0.0 };
 

@@ -1,8 +1,8 @@
 use energy_dsl::Vector3;
 use energy_solve::{BlockMatrix, Curvature, LinearisationOptions, State, System, Term, Weights};
 
-use super::{PlateTerm, Rigidity};
-use crate::mesh::{Diagonals, Plane, Sheet, TriangleMesh};
+use cloth_physics::fabric::{PlateTerm, Rigidity};
+use cloth_physics::mesh::{Diagonals, Plane, Sheet, TriangleMesh};
 
 const YARNS: Rigidity = Rigidity::Orthotropic { warp: 9e-6, weft: 4e-6, bias: 5e-6, poisson_ratio: 0.1 };
 const RUBBING: Rigidity = Rigidity::Flexural { rigidity: 2e-5, poisson_ratio: 0.0 };
