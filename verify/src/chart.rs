@@ -59,13 +59,25 @@ pub(crate) fn product<T: Number>(a: [T; 4], b: [T; 4]) -> [T; 4] {
     ]
 }
 
-/// Scales rotations to unit length.
+/// Scales the rotations among the unknowns to unit length.
 pub(crate) fn normalise(declaration: &Declaration, positions: &mut [f64]) {
-    for rotation in rotations(declaration) {
-        let q = &mut positions[rotation.number..rotation.number + 4];
-        let length = q.iter().map(|part| part * part).sum::<f64>().sqrt();
-        if length > 0.0 {
-            q.iter_mut().for_each(|part| *part /= length);
+    normalise_fields(&*declaration.points, positions);
+}
+
+/// Scales rotations, and those of motions, to unit length.
+pub(crate) fn normalise_fields(fields: &[Field], mut numbers: &mut [f64]) {
+    for field in fields {
+        let (own, others) = numbers.split_at_mut(field.size.min(numbers.len()));
+        numbers = others;
+        if !matches!(field.kind, FieldKind::Rotation | FieldKind::Motion) {
+            continue;
+        }
+        for entry in own.chunks_exact_mut(field.entry_size()) {
+            let q = &mut entry[field.entry_size() - 4..];
+            let length = q.iter().map(|part| part * part).sum::<f64>().sqrt();
+            if length > 0.0 {
+                q.iter_mut().for_each(|part| *part /= length);
+            }
         }
     }
 }

@@ -227,7 +227,7 @@ impl<T: Number<Mask = bool>> JetInputs<T> {
             let own = given[number..number + field.size].to_vec();
             match field.kind {
                 FieldKind::Rotation => positions.extend(turned(own, increment, count, order)),
-                FieldKind::Numbers | FieldKind::Point | FieldKind::TimeStep => positions.extend(moving(own, increment)),
+                _ => positions.extend(moving(own, increment)),
             }
         }
         let velocities = numbers(|sample| &sample.velocities);

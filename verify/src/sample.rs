@@ -130,18 +130,17 @@ pub fn has_points(declaration: &Declaration) -> bool {
     !declaration.points.is_empty() && declaration.points.iter().all(is_point)
 }
 
-/// Whether the rest shape consists of points in the plane or in space.
-fn has_rest_points(declaration: &Declaration) -> bool {
-    let first = declaration.rest.first().map_or(0, |field| field.size);
-    (2..=3).contains(&first) && declaration.rest.iter().all(|field| field.size == first)
-}
-
 /// Draws samples for one declaration.
 pub struct Sampler<'a> {
     declaration: &'a Declaration,
     scope: AuditScope,
     random: Rng,
+    /// Whether the rest shape of an input is regular.
+    is_regular: Box<dyn Fn(&Sample) -> bool + 'a>,
 }
+
+/// Inputs that are drawn until one has a regular rest shape. Half of all triangles are inverted.
+const MOST_DRAWS: usize = 1000;
 
 impl<'a> Sampler<'a> {
     /// Creates a sampler whose samples depend on the seed and the declaration's name only.
@@ -156,7 +155,14 @@ impl<'a> Sampler<'a> {
             .name
             .bytes()
             .fold(0xcbf2_9ce4_8422_2325_u64, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3));
-        Self { declaration, scope: scope.clone(), random: Rng::with_seed(seed ^ name) }
+        let (scope, random) = (scope.clone(), Rng::with_seed(seed ^ name));
+        Self { declaration, scope, random, is_regular: Box::new(|_| true) }
+    }
+
+    /// Draws inputs again whose rest shapes do not satisfy a condition.
+    #[must_use]
+    pub fn with_rest(self, is_regular: impl Fn(&Sample) -> bool + 'a) -> Self {
+        Self { is_regular: Box::new(is_regular), ..self }
     }
 
     /// Returns a uniform number in [low, high).
@@ -171,6 +177,17 @@ impl<'a> Sampler<'a> {
     /// Draws an input: points at distances of about one to eight, within a few units of the origin, or as the
     /// declaration states.
     pub fn sample(&mut self) -> Sample {
+        let mut sample = self.draw();
+        for _ in 1..MOST_DRAWS {
+            if (self.is_regular)(&sample) {
+                break;
+            }
+            sample = self.draw();
+        }
+        sample
+    }
+
+    fn draw(&mut self) -> Sample {
         let declaration = self.declaration;
         let count: usize = declaration.points.iter().map(|point| point.size).sum();
         let size = self.range("scale").map(|(low, high)| self.uniform(low.log2(), high.log2()).exp2());
@@ -180,7 +197,7 @@ impl<'a> Sampler<'a> {
             false => self.unknowns(count),
         };
         let mut rest = self.rest();
-        if let Some(size) = size.filter(|_| has_rest_points(declaration)) {
+        if let Some(size) = size.filter(|_| declaration.rest_points().is_some()) {
             rest.iter_mut().for_each(|x| *x *= size);
         }
         let stretches = self.range("strain");
@@ -209,15 +226,21 @@ impl<'a> Sampler<'a> {
 
     /// Scales rotations to unit length.
     fn turned(&self, mut sample: Sample) -> Sample {
-        chart::normalise(self.declaration, &mut sample.positions);
+        let Declaration { points, rest, parameters, state, kind, .. } = self.declaration;
+        chart::normalise_fields(points, &mut sample.positions);
+        chart::normalise_fields(rest, &mut sample.rest);
+        let implied = if *kind == Kind::Constraint { 2 } else { 0 };
+        let own = parameters.iter().map(|field| field.size).sum::<usize>();
+        chart::normalise_fields(parameters, &mut sample.parameters[..own]);
+        chart::normalise_fields(state, &mut sample.parameters[own + implied..]);
         sample
     }
 
     /// Draws an input whose points are the rest shape, deformed by principal stretches in a range; `None` unless the
     /// rest shape has one point for each point.
     pub fn strained_sample(&mut self, stretches: (f64, f64)) -> Option<Sample> {
-        let Declaration { rest, points, .. } = self.declaration;
-        let has_shape = has_points(self.declaration) && has_rest_points(self.declaration) && rest.len() == points.len();
+        let points_at_rest = self.declaration.rest_points().map(|(_, count)| count);
+        let has_shape = has_points(self.declaration) && points_at_rest == Some(self.declaration.points.len());
         has_shape.then(|| {
             let sample = self.sample();
             let positions = self.deformed(&sample.rest, stretches);
@@ -293,7 +316,7 @@ impl<'a> Sampler<'a> {
 
     /// Draws a deformation of the rest shape by principal stretches in a range, turned and moved at random.
     fn deformed(&mut self, rest: &[f64], (low, high): (f64, f64)) -> Vec<f64> {
-        let dimension = self.declaration.rest[0].size;
+        let dimension = self.declaration.rest[0].entry_size();
         let mut axes = self.rotation();
         if dimension == 2 {
             // A turn in the plane.
@@ -334,16 +357,17 @@ impl<'a> Sampler<'a> {
         points.chunks(3).flat_map(|p| rotate(&turn, p)).enumerate().map(|(i, x)| scale * x + offset[i % 3]).collect()
     }
 
-    /// Draws a rest shape: points in the plane or in space (a triangle or tetrahedron has positive size), or plain
+    /// Draws a rest shape: points in the plane or in space (a triangle or tetrahedron has positive size), and plain
     /// numbers.
     fn rest(&mut self) -> Vec<f64> {
         let fields = &*self.declaration.rest;
-        let count = fields.iter().map(|field| field.size).sum();
-        let dimension = fields.first().map_or(0, |field| field.size);
-        if !(2..=3).contains(&dimension) || fields.iter().any(|field| field.size != dimension) {
-            return fields.iter().flat_map(|field| self.parameter(field)).collect();
-        }
-        self.shape(count, dimension, is_oriented)
+        let dimension = fields.iter().map(Field::entry_size).find(|size| (2..=3).contains(size));
+        let are_points = |field: &Field| Some(field.entry_size()) == dimension;
+        let count = fields.iter().filter(|field| are_points(field)).map(|field| field.size).sum();
+        let mut shape = dimension.map(|dimension| self.shape(count, dimension, is_oriented)).unwrap_or_default();
+        let one =
+            |field: &Field| if are_points(field) { shape.drain(..field.size).collect() } else { self.parameter(field) };
+        fields.iter().flat_map(one).collect()
     }
 
     /// Draws points in the box (−1, 1) that are well separated, with a demand that falls with each attempt, until

@@ -15,7 +15,7 @@ fn elements() -> Vec<Interpreted> {
 #[test]
 fn audits_pass_and_notice_planted_faults() {
     let targets = Target::of_text(TEXT, "unknowns.energy").unwrap_or_else(|errors| panic!("{errors}"));
-    assert!(targets.len() >= 25);
+    assert!(targets.len() >= 40);
     let report = audit_all(&targets, None, Options { mutations: 12, ..Options::quick() });
     let failures: Vec<String> = report.failures().map(describe_failure).collect();
     assert!(failures.is_empty() && report.refused.is_empty(), "{}\n{:?}", failures.join("\n"), report.refused);
@@ -46,6 +46,7 @@ fn opposite_quaternions_give_the_same_bits() {
     for element in elements() {
         let declaration = element.declaration();
         let is_rotated = ["Aim", "Arm", "BallJoint", "Weld", "Anchor", "Axle", "Thrust", "Align", "TorqueSquared"];
+        let is_rotated = [&is_rotated[..], &["Isotropic", "CosseratRod", "PoseGraph"]].concat();
         if !is_rotated.contains(&&*declaration.name) {
             continue;
         }
@@ -105,4 +106,29 @@ fn a_state_goes_on_from_the_old_one() {
     assert_eq!(jacobians[2], [0.0, 1.0, 1.0, 0.0]);
     let (slopes, _) = swap.routine("state_jacobian", &inputs).unwrap().unwrap();
     assert_eq!(slopes[1], [14.0, 14.0, 0.0, 0.0, 2.0, 2.0]);
+}
+
+/// log(q) is regular at the identity, keeps the digits of tiny turns, and is flagged at half a turn, where it jumps.
+#[test]
+fn rotation_vectors_are_regular_up_to_half_a_turn() {
+    let element = Interpreted::from_source("residual Vector(q: Rotation) { log(q) }").unwrap().remove(0);
+    let at = |q: [f64; 4]| {
+        let inputs = Inputs { parameters: &[], rest: &[], positions: &q, velocities: &[] };
+        let value = element.routine("residual", &inputs).unwrap().unwrap();
+        let (jacobian, flags) = element.routine("jacobian", &inputs).unwrap().unwrap();
+        (value.0[0].clone(), jacobian[1].clone(), value.1.degenerate || flags.degenerate)
+    };
+    for sign in [1.0, -1.0] {
+        let (value, jacobian, flagged) = at([sign, 0.0, 0.0, 0.0]);
+        assert_eq!((value, flagged), (vec![0.0; 3], false));
+        assert_eq!(jacobian, [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]);
+    }
+    for angle in [1e-300, 1e-12, 1e-3, 1.5, 2.1, 3.1] {
+        let half: f64 = angle / 2.0;
+        let (value, _, flagged) = at([half.cos(), 0.6 * half.sin(), 0.0, -0.8 * half.sin()]);
+        // The angle of rounded numbers: near half a turn, the cosine has its digits, and not the sine.
+        let error = (value[0] / (0.6 * angle) - 1.0).abs().max((value[2] / (-0.8 * angle) - 1.0).abs());
+        assert!(error < 1e-15 && value[1] == 0.0 && !flagged, "{angle}: {value:?}");
+    }
+    assert!(at([0.0, 1.0, 0.0, 0.0]).2);
 }

@@ -62,6 +62,9 @@ pub enum FieldKind {
     /// A rotation, a unit quaternion w, x, y, z. As an unknown q, it moves by a rotation vector δ: q ← exp(δ) q, which
     /// turns by |δ| about δ.
     Rotation,
+    /// A position in space, then a rotation. Unknowns are listed part by part, so this is a parameter, a rest shape or a
+    /// state.
+    Motion,
     /// A parameter that integrators set to the length of the time step.
     TimeStep,
 }
@@ -77,16 +80,25 @@ pub struct Field {
     pub shared: bool,
     /// Number of scalars.
     pub size: usize,
+    /// Number of entries of an array; 1 for other inputs.
+    pub entries: usize,
     /// Unit, as declared; empty if none was given.
     pub unit: Cow<'static, str>,
 }
 
 impl Field {
+    /// Returns the number of scalars of an entry of an array, or of an input that is none.
+    #[must_use]
+    pub const fn entry_size(&self) -> usize {
+        self.size / self.entries
+    }
+
     /// Returns the number of coordinates in which the input moves as an unknown: 3 for a rotation, else its size.
     #[must_use]
     pub const fn increments(&self) -> usize {
         match self.kind {
             FieldKind::Rotation => 3,
+            FieldKind::Motion => 6,
             FieldKind::Numbers | FieldKind::Point | FieldKind::TimeStep => self.size,
         }
     }
@@ -224,6 +236,15 @@ impl Declaration {
     pub fn is_mixed(&self) -> bool {
         let is_own_point = |field: &Field| field.kind == FieldKind::Point && field.size == 3 && !field.shared;
         self.kind != Kind::Residual && !self.points.iter().all(is_own_point)
+    }
+
+    /// Returns dimension and number of the points that the rest shape consists of, in the plane or in space; `None` if it
+    /// has other inputs.
+    #[must_use]
+    pub fn rest_points(&self) -> Option<(usize, usize)> {
+        let dimension = self.rest.first()?.entry_size();
+        let are_points = (2..=3).contains(&dimension) && self.rest.iter().all(|field| field.entry_size() == dimension);
+        are_points.then(|| (dimension, self.rest.iter().map(|field| field.entries).sum()))
     }
 
     /// Returns the count of numbers that hold the unknowns.

@@ -141,7 +141,7 @@ pub(crate) fn seeds<T: Real, const U: usize, const D: usize>(fields: &[Field], u
 }
 
 pub(crate) const fn field(name: &'static str, kind: FieldKind, size: usize, shared: bool) -> Field {
-    Field { name: Borrowed(name), kind, shared, size, unit: Borrowed("") }
+    Field { name: Borrowed(name), kind, shared, size, entries: 1, unit: Borrowed("") }
 }
 
 pub(crate) const fn declared(name: &'static str, unknowns: &'static [Field], state: &'static [Field]) -> Declaration {

@@ -19,7 +19,7 @@ const fn declaration(
     quadratic: bool,
 ) -> Declaration {
     const POINT: Field =
-        Field { name: Borrowed("p"), kind: FieldKind::Point, shared: false, size: 3, unit: Borrowed("m") };
+        Field { name: Borrowed("p"), kind: FieldKind::Point, shared: false, size: 3, entries: 1, unit: Borrowed("m") };
     Declaration {
         name: Borrowed(name),
         kind,

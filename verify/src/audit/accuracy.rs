@@ -1,4 +1,4 @@
-use energy_dsl::{Declaration, Field};
+use energy_dsl::Declaration;
 use fastrand::Rng;
 
 use super::subject::Subject;
@@ -100,8 +100,8 @@ fn offset(declaration: &Declaration, sample: &Sample, (what, size): (Perturbed, 
         true => edges(&sample.positions, 3, &mut nudge),
         false => all(&sample.positions, &mut nudge),
     };
-    let rest = match dimension(&declaration.rest) {
-        Some(dimension) => edges(&sample.rest, dimension, &mut nudge),
+    let rest = match declaration.rest_points() {
+        Some((dimension, _)) => edges(&sample.rest, dimension, &mut nudge),
         None => all(&sample.rest, &mut nudge),
     };
     let velocities = match has_points(declaration) && !sample.velocities.is_empty() {
@@ -133,12 +133,6 @@ pub(super) fn true_amplifications(subject: &Subject, sample: &Sample, here: &[Tr
         }
     }
     (most, bits)
-}
-
-/// Returns the dimension of the rest shape's points; `None` if the rest shape has no points.
-fn dimension(rest: &[Field]) -> Option<usize> {
-    let dimension = rest.first()?.size;
-    ((2..=3).contains(&dimension) && rest.iter().all(|field| field.size == dimension)).then_some(dimension)
 }
 
 #[cfg(test)]

@@ -224,7 +224,9 @@ impl Subject {
     /// Returns a sampler of the domain that the declaration states.
     #[must_use]
     pub fn sampler(&self, seed: u64) -> Sampler<'_> {
-        Sampler::within(&self.formula.program().audit_scope, &self.declaration, seed)
+        let routines = self.routines.as_ref().or(self.interpreted.as_ref());
+        let is_regular = move |sample: &Sample| routines.is_none_or(|one| one.check_rest(&sample.inputs()).is_ok());
+        Sampler::within(&self.formula.program().audit_scope, &self.declaration, seed).with_rest(is_regular)
     }
 
     /// Returns the samples that the declaration asks for, if it was read at run time.

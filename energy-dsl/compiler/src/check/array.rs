@@ -175,50 +175,51 @@ impl<'a> Checker<'a> {
     }
 
     /// Returns the range of an index, and counts its terms.
-    fn range(&mut self, sum: &'a Sum, span: &Span) -> Option<Range<usize>> {
-        let (first, end) = (self.whole_number(&sum.first, "a range"), self.whole_number(&sum.end, "a range"));
-        let (first, end) = (first?, end?);
-        if first >= end {
-            let message = format!("the range {first}..{end} is empty");
-            self.error(&sum.end.span, message);
+    pub(super) fn range(&mut self, first: &'a Expression, end: &'a Expression, span: &Span) -> Option<Range<usize>> {
+        let (from, to) = (self.whole_number(first, "a range"), self.whole_number(end, "a range"));
+        let (from, to) = (from?, to?);
+        if from >= to {
+            let message = format!("the range {from}..{to} is empty");
+            self.error(&end.span, message);
             return None;
         }
-        self.terms += end - first;
+        self.terms += to - from;
         if self.terms > MOST_TERMS {
-            self.error(span, format!("the sums unroll to more than {MOST_TERMS} terms"));
+            self.error(span, format!("the sums and loops unroll to more than {MOST_TERMS} terms"));
             return None;
         }
-        Some(first..end)
+        Some(from..to)
     }
 
-    /// Returns the term of an index.
-    fn term(&mut self, sum: &'a Sum, number: usize) -> Option<Typed> {
-        let scope = [(sum.index.canonical(), Some(Meaning::Index(number)))];
+    /// Returns what `check` finds where an index has a value.
+    pub(super) fn at_index<T>(&mut self, index: &Name, number: usize, check: impl FnOnce(&mut Self) -> T) -> T {
+        let scope = [(index.canonical(), Some(Meaning::Index(number)))];
         self.scopes.push(scope.into_iter().collect());
-        let term = self.expression(&sum.term);
+        let found = check(self);
         self.scopes.pop();
-        term
+        found
     }
 
-    /// Checks and unrolls `for j in 0..end { a[j] = term; }` to the array of the terms.
+    /// Checks and unrolls `[term for j in first..end]` to the array of the terms.
     #[inline(never)]
     pub(super) fn each(&mut self, each: &'a Sum, span: &Span) -> Option<Typed> {
-        let range = self.range(each, span)?;
-        if range.start > 0 {
-            return self.error(&each.first.span, "the loop must give every entry a value: it begins at 0");
+        let range = self.range(&each.first, &each.end, span)?;
+        let length = u16::try_from(range.len()).expect("sums have few terms");
+        let term = |number| self.at_index(&each.index, number, |checker| checker.expression(&each.term));
+        let terms: Vec<Typed> = range.map(term).collect::<Option<_>>()?;
+        if let Some(term) = terms.iter().find(|term| term.shape == Shape::Truth) {
+            return self.error(&term.span, "an array entry cannot be a comparison");
         }
-        let length = u16::try_from(range.end).ok()?;
-        let terms: Vec<Typed> = range.map(|number| self.term(each, number)).collect::<Option<_>>()?;
         Some(Typed { kind: TypedKind::Array(terms), shape: Shape::Array(length), span: span.clone() })
     }
 
     /// Checks and unrolls `sum(j in first..end, term)`.
     #[inline(never)]
     pub(super) fn sum(&mut self, sum: &'a Sum, span: &Span) -> Option<Typed> {
-        let range = self.range(sum, span)?;
+        let range = self.range(&sum.first, &sum.end, span)?;
         let mut total: Option<Typed> = None;
         for number in range {
-            let term = self.term(sum, number)?;
+            let term = self.at_index(&sum.index, number, |checker| checker.expression(&sum.term))?;
             total = Some(match total {
                 None => term,
                 Some(total) => self.apply("+", span, vec![total, term])?,

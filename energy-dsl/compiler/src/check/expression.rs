@@ -3,7 +3,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::constant::Globals;
 use super::names::CONTEXTUAL;
 use super::remedy;
-use super::signature::Signature;
+use super::signature::{InputName, Signature};
 use super::typed::{Binding, Source, Typed, TypedKind};
 use crate::budget::Budget;
 use crate::diagnostic::{Diagnostic, Diagnostics, Span};
@@ -112,9 +112,17 @@ impl<'a> Checker<'a> {
 
     /// Reports inputs that the formula does not read.
     pub(super) fn report_unused(&mut self, declaration: &Name) {
+        let is_read = |input: &InputName| self.used.contains(&input.name.canonical());
+        let of_source = |source| self.signature.names.iter().filter(move |input| input.source == source);
+        let velocities: Vec<_> = of_source(Source::Velocity).filter(|input| is_read(input)).collect();
         for input in &self.signature.names {
+            // A velocity is that of an unknown.
+            let moves = |velocity: &&InputName| {
+                velocity.numbers.start < input.numbers.end && input.numbers.start < velocity.numbers.end
+            };
+            let is_read = is_read(input) || input.source == Source::Position && velocities.iter().any(moves);
             let name = &input.name;
-            if !self.used.contains(&name.canonical()) && !name.text.starts_with('_') {
+            if !is_read && !name.text.starts_with('_') {
                 let message = format!("the input `{}` of {} is never used", name.text, declaration.text);
                 self.diagnostics.push(Diagnostic::new(&name.span, message).help("use it in the formula, or remove it"));
             }
@@ -241,29 +249,50 @@ impl<'a> Checker<'a> {
     // Checking recurses over expressions: rare cases have their own frame.
     #[inline(never)]
     fn conditional(&mut self, [yes, no]: [&'a Body; 2], condition: &'a Expression, span: &Span) -> Option<Typed> {
-        let checked = self.expression(condition);
+        let place = &condition.span;
+        let condition = self.expression(condition);
         let (yes, no) = (self.body(yes, false), self.body(no, false));
-        let (condition_shape, yes, no) = (checked?, yes?, no?);
-        if condition_shape.shape != Shape::Truth {
-            return self
-                .error(&condition.span, format!("expected a comparison after `if`, found {}", condition_shape.shape));
+        let (condition, yes, no) = (condition?, yes?, no?);
+        if condition.shape != Shape::Truth {
+            return self.error(place, format!("expected a comparison after `if`, found {}", condition.shape));
         }
         if yes.shape != no.shape {
-            return self.error(
-                span,
-                format!("both branches must have the same shape, but they are {} and {}", yes.shape, no.shape),
-            );
-        }
-        if matches!(yes.shape, Shape::Array(_) | Shape::Truth) {
-            return self.error(span, format!("a branch must be a value, but it is {}", yes.shape));
+            return self.different_branches(span, &yes, &no);
         }
         // A constant condition is decided here. The other branch leaves no operations.
-        if let Some(truth) = super::constant::truth(&self.bindings, &condition_shape) {
+        if let Some(truth) = super::constant::truth(&self.bindings, &condition) {
             return Some(if truth { yes } else { no });
         }
+        self.choice(condition, [yes, no], span)
+    }
+
+    /// Returns one of two values; of arrays, entry by entry.
+    fn choice(&mut self, condition: Typed, [yes, no]: [Typed; 2], span: &Span) -> Option<Typed> {
+        if yes.shape != no.shape {
+            return self.different_branches(span, &yes, &no);
+        }
         let shape = yes.shape;
-        let kind = TypedKind::Select(Box::new(condition_shape), Box::new(yes), Box::new(no));
+        let kind = match shape {
+            Shape::Truth => return self.error(span, format!("a branch must be a value, but it is {shape}")),
+            Shape::Array(_) => {
+                let condition = match self.bind(condition, self.in_rest) {
+                    Meaning::Binding(number, shape) => {
+                        Typed { kind: TypedKind::Binding(number), shape, span: span.clone() }
+                    }
+                    _ => unreachable!("compiler bug: a comparison is one value"),
+                };
+                let entries = yes.into_entries().into_iter().zip(no.into_entries());
+                let choice = |(yes, no)| self.choice(condition.clone(), [yes, no], span);
+                TypedKind::Array(entries.map(choice).collect::<Option<_>>()?)
+            }
+            _ => TypedKind::Select(Box::new(condition), Box::new(yes), Box::new(no)),
+        };
         Some(Typed { kind, shape, span: span.clone() })
+    }
+
+    fn different_branches(&mut self, span: &Span, yes: &Typed, no: &Typed) -> Option<Typed> {
+        let message = format!("both branches must have the same shape, but they are {} and {}", yes.shape, no.shape);
+        self.error(span, message)
     }
 
     /// Pays for typed expressions. `None` if the budget is spent.
@@ -306,10 +335,13 @@ impl<'a> Checker<'a> {
         let entries = match meaning {
             Meaning::Binding(number, shape) => return Some(Typed { kind: TypedKind::Binding(number), shape, span }),
             Meaning::Index(number) => return Some(constant(number as f64, &span)),
+            Meaning::Input(Source::Velocity, first, Shape::Twist, None) => return self.velocity_of_motion(name, first),
             Meaning::Input(source, first, shape, None) => return self.input(name, source, first, shape),
             Meaning::Input(source, first, shape, Some(length)) => {
                 // Reports one error for all entries.
-                self.input(name, source, first, shape)?;
+                if shape != Shape::Twist || source != Source::Velocity {
+                    self.input(name, source, first, shape)?;
+                }
                 let entry = |i: usize| Meaning::Input(source, first + i * shape.size(), shape, None);
                 (0..length).map(entry).collect()
             }
@@ -319,6 +351,14 @@ impl<'a> Checker<'a> {
         let entries: Vec<_> = entries.into_iter().map(|entry| self.meant(name, entry)).collect::<Option<_>>()?;
         let length = u16::try_from(entries.len()).expect("arrays are short");
         Some(Typed { kind: TypedKind::Array(entries), shape: Shape::Array(length), span })
+    }
+
+    /// Returns the velocity of a motion as a twist: its angular velocity, and the velocity of its position, which comes
+    /// first among the increments.
+    fn velocity_of_motion(&mut self, name: &Name, first: usize) -> Option<Typed> {
+        let mut part = |first| self.input(name, Source::Velocity, first, Shape::Vector(3));
+        let (linear, angular) = (part(first)?, part(first + 3)?);
+        self.apply("twist", &name.span, vec![angular, linear])
     }
 
     fn input(&mut self, name: &Name, source: Source, first: usize, shape: Shape) -> Option<Typed> {

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use crate::diagnostic::{Diagnostic, Diagnostics};
 use crate::functions;
-use crate::syntax::{Body, Declaration, Expression, ExpressionKind, Item, Name, UserFunction, without_hat};
+use crate::syntax::{Assignment, Body, Declaration, Expression, ExpressionKind, Item, Name, UserFunction, without_hat};
 
 /// Functions of the language that a text may define otherwise.
 pub(super) const CONTEXTUAL: [&str; 1] = ["interpolate"];
@@ -17,7 +17,7 @@ const NUMBERS: [(&str, &str); 4] =
 /// Reports names that are declared twice, and definitions that hide another name. Returns the definitions that nothing
 /// uses: they are errors only if there is no other error, which may be the reason.
 pub(super) fn check_names(items: &[Item], diagnostics: &mut Diagnostics) -> Vec<Diagnostic> {
-    let mut names = Names { scopes: vec![Vec::new()], diagnostics, unused: Vec::new() };
+    let mut names = Names::new(diagnostics);
     let mut declarations: Vec<&Name> = Vec::new();
     // All of them are visible in the whole text.
     for item in items {
@@ -42,6 +42,7 @@ pub(super) fn check_names(items: &[Item], diagnostics: &mut Diagnostics) -> Vec<
         }
     }
     names.close();
+    names.report_calls();
     names.unused
 }
 
@@ -86,9 +87,26 @@ struct Names<'a, 'd> {
     scopes: Vec<Vec<Entry<'a>>>,
     diagnostics: &'d mut Diagnostics,
     unused: Vec<Diagnostic>,
+    /// Functions that the text calls.
+    called: BTreeSet<&'a str>,
+    /// Values that are named like functions of the language.
+    like_functions: Vec<&'a Name>,
 }
 
-impl<'a> Names<'a, '_> {
+impl<'a, 'd> Names<'a, 'd> {
+    fn new(diagnostics: &'d mut Diagnostics) -> Self {
+        let (unused, called, like_functions) = (Vec::new(), BTreeSet::new(), Vec::new());
+        Self { scopes: vec![Vec::new()], diagnostics, unused, called, like_functions }
+    }
+
+    /// Reports values that are named like a function of the language which the text also calls.
+    fn report_calls(&mut self) {
+        for name in self.like_functions.iter().filter(|name| self.called.contains(name.text.as_str())) {
+            let message = format!("`{}` is a function of the language, which this text also calls", name.text);
+            self.diagnostics.push(Diagnostic::new(&name.span, message).help("choose another name"));
+        }
+    }
+
     fn declaration(&mut self, declaration: &'a Declaration) {
         let inputs = declaration.inputs.iter().flat_map(|group| &group.names);
         // The signature reports inputs that are declared twice.
@@ -125,8 +143,19 @@ impl<'a> Names<'a, '_> {
                 self.expression(&statement.value);
                 self.define(&statement.name, Role::Value);
             }
-            next.assignments.iter().for_each(|assignment| self.expression(&assignment.value));
+            next.assignments.iter().for_each(|assignment| self.assignment(assignment));
         }
+        self.close();
+    }
+
+    fn assignment(&mut self, assignment: &'a Assignment) {
+        self.scopes.push(Vec::new());
+        if let Some((index, first, end)) = &assignment.range {
+            self.expression(first);
+            self.expression(end);
+            self.define(index, Role::Variable);
+        }
+        assignment.entry.iter().chain([&assignment.value]).for_each(|part| self.expression(part));
         self.close();
     }
 
@@ -162,6 +191,7 @@ impl<'a> Names<'a, '_> {
             }
             ExpressionKind::Component(of, _) => self.expression(of),
             ExpressionKind::Sum(sum) | ExpressionKind::Each(sum) => {
+                self.called.extend(matches!(expression.kind, ExpressionKind::Sum(_)).then_some("sum"));
                 self.expression(&sum.first);
                 self.expression(&sum.end);
                 self.scopes.push(Vec::new());
@@ -189,7 +219,8 @@ impl<'a> Names<'a, '_> {
         }
     }
 
-    fn call(&mut self, name: &Name) {
+    fn call(&mut self, name: &'a Name) {
+        self.called.insert(&name.text);
         if let Some(entry) = self.find(|entry| entry.role == Role::Function && entry.name.text == name.text) {
             entry.used = true;
         }
@@ -201,13 +232,15 @@ impl<'a> Names<'a, '_> {
     }
 
     /// Reports a definition that hides another name. Only a value may replace an earlier value.
-    fn report_hidden(&mut self, name: &Name, role: Role) {
+    fn report_hidden(&mut self, name: &'a Name, role: Role) {
         let text = &name.text;
         let function = functions::find(text).is_some() || FORMS.contains(&text.as_str());
         let function = function && !CONTEXTUAL.contains(&text.as_str());
         let number = NUMBERS.iter().find(|(number, _)| number == text).map(|(_, meaning)| *meaning);
         let built_in = if function { Some("a function of the language") } else { number };
-        if let Some(built_in) = built_in.filter(|_| role != Role::Variable) {
+        if function && matches!(role, Role::Value | Role::Constant) {
+            self.like_functions.push(name);
+        } else if let Some(built_in) = built_in.filter(|_| role != Role::Variable) {
             let message = format!("`{text}` is {built_in} and cannot be defined again");
             self.diagnostics.push(Diagnostic::new(&name.span, message).help("choose another name"));
             return;
@@ -267,8 +300,12 @@ pub(super) fn mentioned(item: &Item) -> BTreeSet<String> {
 fn mentioned_in_body(body: &Body, found: &mut BTreeSet<String>) {
     body.constants.iter().for_each(|constant| mentioned_in(&constant.value, found));
     body.functions.iter().for_each(|function| mentioned_in_body(&function.body, found));
-    let of_next = body.next.iter().flat_map(|next| next.lets.iter().chain(&next.assignments));
+    let of_next = body.next.iter().flat_map(|next| &next.lets);
     body.lets.iter().chain(of_next).for_each(|statement| mentioned_in(&statement.value, found));
+    for assignment in body.next.iter().flat_map(|next| &next.assignments) {
+        let range = assignment.range.iter().flat_map(|(_, first, end)| [first, end]);
+        range.chain(&assignment.entry).chain([&assignment.value]).for_each(|part| mentioned_in(part, found));
+    }
     mentioned_in(&body.result, found);
 }
 

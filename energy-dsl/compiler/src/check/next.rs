@@ -8,7 +8,7 @@ use super::signature::{InputName, Signature};
 use super::typed::{Binding, Source, Typed, TypedKind};
 use crate::diagnostic::{Diagnostic, Diagnostics, nearest};
 use crate::functions::Shape;
-use crate::syntax::{Body, Declaration, Expression, Let, Name, Next};
+use crate::syntax::{Assignment, Body, Declaration, Expression, Name, Next};
 
 impl<'a> Checker<'a> {
     /// Returns the new values of the state, row by row; `None` after an error.
@@ -18,43 +18,31 @@ impl<'a> Checker<'a> {
             self.define(&statement.name, value, false);
         }
         let states: Vec<&InputName> = self.signature.names.iter().filter(|name| name.is_state).collect();
-        let mut values: Vec<Option<Typed>> = vec![None; states.len()];
+        let mut values: NewValues = states.iter().map(|state| vec![None; state.length.unwrap_or(1)]).collect();
         let mut is_sound = true;
         for assignment in &next.assignments {
-            match self.assigned(assignment, &states) {
-                Some((state, value)) if values[state].is_none() => values[state] = Some(value),
-                Some(_) => {
-                    let name = &assignment.name;
-                    self.error(&name.span, format!("`next` gives the state `{}` two new values", name.text));
-                    is_sound = false;
-                }
-                None => is_sound = false,
-            }
+            is_sound &= self.assign(assignment, &states, &mut values).is_some();
         }
         if !is_sound {
             return None;
         }
-        let missing: Vec<&str> = states
-            .iter()
-            .zip(&values)
-            .filter(|(_, value)| value.is_none())
-            .map(|(state, _)| state.name.text.as_str())
-            .collect();
+        let missing: Vec<String> =
+            states.iter().zip(&values).flat_map(|(state, values)| without_value(state, values)).collect();
         if let Some(first) = missing.first() {
             let message = format!("`next` gives no new value to the state: {}", missing.join(", "));
             let help = format!("a state that stays as it is has {first} = {first};");
             self.diagnostics.push(Diagnostic::new(&next.span, message).help(help));
             return None;
         }
+        let entries: Vec<Typed> = values.into_iter().flatten().flatten().collect();
         let bindings = &self.bindings;
-        if values.iter().flatten().any(|value| reads(bindings, value, &[Source::Velocity], &mut BTreeSet::new())) {
+        if entries.iter().any(|value| reads(bindings, value, &[Source::Velocity], &mut BTreeSet::new())) {
             let message = "`next` depends on velocities, which it does not know";
             let help = "keep the positions of the last step in a state, and take their difference";
             self.diagnostics.push(Diagnostic::new(&next.span, message).help(help));
             return None;
         }
-        let entries = values.into_iter().flatten().flat_map(Typed::into_entries);
-        Some(rows(entries.collect(), &next.span))
+        Some(rows(entries, &next.span))
     }
 
     /// Returns the value of the state at rest, row by row; `None` if it is given with each element.
@@ -86,10 +74,10 @@ impl<'a> Checker<'a> {
         is_sound.then(|| rows(entries, &span))
     }
 
-    /// Returns the number of the state that is assigned to, and its new value.
-    fn assigned(&mut self, Let { name, value, .. }: &'a Let, states: &[&InputName]) -> Option<(usize, Typed)> {
-        let checked = self.expression(value);
-        if !states.iter().any(|state| state.canonical == name.canonical()) {
+    /// Checks an assignment, and keeps the new values. `None` after an error.
+    fn assign(&mut self, assignment: &'a Assignment, states: &[&InputName], values: &mut NewValues) -> Option<()> {
+        let Assignment { name, entry, range, value } = assignment;
+        let Some(number) = states.iter().position(|state| state.canonical == name.canonical()) else {
             let near = nearest(&name.text, states.iter().map(|state| state.name.text.as_str()));
             let help = match near {
                 Some(near) => format!("did you mean `{near}`?"),
@@ -99,7 +87,52 @@ impl<'a> Checker<'a> {
             self.diagnostics.push(Diagnostic::new(&name.span, message).help(help));
             return None;
         };
-        self.fitting(name, value, checked?, states)
+        let new = match (entry, range) {
+            (None, _) => {
+                let checked = self.expression(value)?;
+                let (_, checked) = self.fitting(name, value, checked, states)?;
+                checked.into_entries().into_iter().enumerate().collect()
+            }
+            (Some(entry), None) => vec![self.new_entry(entry, value, states[number])?],
+            (Some(entry), Some((index, first, end))) => {
+                let range = self.range(first, end, &name.span)?;
+                let new = |at| self.at_index(index, at, |checker| checker.new_entry(entry, value, states[number]));
+                range.map(new).collect::<Option<_>>()?
+            }
+        };
+        for (entry, value) in new {
+            if values[number][entry].replace(value).is_some() {
+                let what = state_entry(states[number], entry);
+                self.error(&name.span, format!("`next` gives the state `{what}` two new values"));
+                return None;
+            }
+        }
+        Some(())
+    }
+
+    /// Returns the index of an entry of a state, and its new value.
+    fn new_entry(&mut self, entry: &'a Expression, value: &'a Expression, state: &InputName) -> Option<(usize, Typed)> {
+        let name = &state.name.text;
+        let number = self.whole_number(entry, "an index")?;
+        let Some(length) = state.length else {
+            let message = format!("the state `{name}` is {}: it is assigned as a whole", state.shape);
+            self.error(&entry.span, message);
+            return None;
+        };
+        if number >= length {
+            let message =
+                format!("the index {number} is out of range: `{name}` has {length} entries, 0 to {}", length - 1);
+            self.error(&entry.span, message);
+            return None;
+        }
+        let checked = self.expression(value)?;
+        if checked.shape != state.shape {
+            let message =
+                format!("an entry of the state `{name}` is {}, but its value is {}", state.shape, checked.shape);
+            self.error(&value.span, message);
+            return None;
+        }
+        Some((number, checked))
     }
 
     /// Returns the number of a state and its value, if that has the state's shape.
@@ -126,6 +159,25 @@ impl<'a> Checker<'a> {
             return None;
         }
         Some((number, checked))
+    }
+}
+
+/// The new values of each state, entry by entry.
+type NewValues = Vec<Vec<Option<Typed>>>;
+
+/// Returns a state, or the entries of one, that have no new value.
+fn without_value(state: &InputName, values: &[Option<Typed>]) -> Vec<String> {
+    if values.iter().all(Option::is_none) {
+        return vec![state.name.text.clone()];
+    }
+    let missing = values.iter().enumerate().filter(|(_, value)| value.is_none());
+    missing.map(|(entry, _)| state_entry(state, entry)).collect()
+}
+
+fn state_entry(state: &InputName, entry: usize) -> String {
+    match state.length {
+        Some(_) => format!("{}[{entry}]", state.name.text),
+        None => state.name.text.clone(),
     }
 }
 

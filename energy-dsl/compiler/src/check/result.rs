@@ -56,13 +56,16 @@ pub(super) fn expected(
         (Kind::Energy, _) => {
             Some((format!("an energy must be a scalar, but this is {found}"), "take its norm or a component's square"))
         }
-        (Kind::Force, _) if signature.moving.iter().all(|input| force_on(input) == Shape::Vector(3)) => Some((
-            format!("a force must be one 3-vector for each of the {points} points, but this is {found}"),
-            "write [f1, f2, …], one vector for each point in declared order",
-        )),
+        (Kind::Force, _) if signature.moving.iter().all(|input| input.input_type.element == ElementType::Point) => {
+            Some((
+                format!("a force must be one 3-vector for each of the {points} points, but this is {found}"),
+                "write [f1, f2, …], one vector for each point in declared order",
+            ))
+        }
         (Kind::Force, _) => Some((
             format!("a force must be one value for each of the {points} unknowns, but this is {found}"),
-            "write [f1, f2, …], one for each unknown in declared order: its shape, and a 3-vector for a rotation",
+            "write [f1, f2, …], one for each unknown in declared order: its shape, a torque for a rotation, and both a \
+             force and a torque for a motion",
         )),
         _ => Some((
             format!("a {} must be a scalar or a vector, but this is {found}", kind.keyword()),

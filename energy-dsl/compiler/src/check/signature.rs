@@ -1,3 +1,5 @@
+use std::ops::Range;
+
 use super::constant::Globals;
 use super::expression::Checker;
 use super::typed::{Input, Source};
@@ -28,8 +30,19 @@ pub(super) struct InputName {
     pub(super) shape: Shape,
     /// Length of the array; `None` if the input is not an array.
     pub(super) length: Option<usize>,
+    /// Numbers among the unknowns, or among the velocities, which belong to the unknowns in order.
+    pub(super) numbers: Range<usize>,
     /// Whether it is part of the state.
     pub(super) is_state: bool,
+}
+
+/// An unknown that has a velocity.
+struct Owner {
+    name: String,
+    /// Number of its first increment.
+    increment: usize,
+    /// Shape of its velocity.
+    shape: Shape,
 }
 
 impl Signature {
@@ -132,33 +145,50 @@ impl Signature {
     /// Gives each velocity to the unknown with its number, and as many components as its increment has. Velocities are
     /// numbered by increments.
     fn assign_velocities(&mut self, velocities: usize, diagnostics: &mut Diagnostics) {
-        let mut firsts = Vec::with_capacity(self.moving.len());
-        let mut next = 0;
-        for input in &self.moving {
-            let increments = input.input_type.element.increments();
-            firsts.push((next, increments));
-            next += increments;
-        }
+        let owners = self.owners_of_velocities();
         for name in self.names.iter_mut().filter(|name| name.source == Source::Velocity) {
-            let (number, length) = (name.first / 3, name.length.unwrap_or(1));
-            let given = &firsts[firsts.len().min(number)..firsts.len().min(number + length)];
-            if given.len() < length {
-                let message = format!("{velocities} velocities for {} points: expected at most one each", firsts.len());
+            let Range { start, end } = name.numbers;
+            let given = &owners[owners.len().min(start)..owners.len().min(end)];
+            if given.len() < end - start {
+                let message =
+                    format!("{velocities} velocities for {} unknowns: expected at most one each", owners.len());
                 diagnostics.push(Diagnostic::new(&name.name.span, message));
                 return;
             }
-            let Some(&(first, increments)) = given.first() else { continue };
-            if let Some(other) = given.iter().position(|(_, others)| *others != increments) {
-                let [of, other] = [number, number + other].map(|unknown| &self.moving[unknown].name);
+            let Some(first) = given.first() else { continue };
+            if let Some(other) = given.iter().find(|other| other.shape != first.shape) {
+                let (of, other) = (&first.name, &other.name);
                 let message = format!("`{}` would have velocities of `{of}` and of `{other}`", name.name.text);
                 let help =
                     "velocities belong to the unknowns in declared order; an array of them to unknowns of one size";
                 diagnostics.push(Diagnostic::new(&name.name.span, message).help(help));
                 return;
             }
-            name.first = first;
-            name.shape = if increments == 1 { Shape::Scalar } else { Shape::Vector(increments as u8) };
+            (name.first, name.shape) = (first.increment, first.shape);
         }
+    }
+
+    /// Lists the unknowns that velocities belong to, in declared order.
+    fn owners_of_velocities(&self) -> Vec<Owner> {
+        let (mut moving, mut increment) = (self.moving.iter(), 0);
+        let declared = self.names.iter().filter(|name| name.source == Source::Position);
+        let entries = declared.flat_map(|name| vec![name; name.length.unwrap_or(1)]);
+        let owner = |declared: &InputName| {
+            let unknown = moving.next()?;
+            let first = increment;
+            let shape = if declared.shape == Shape::Motion {
+                // Its position, then its rotation.
+                moving.next();
+                increment += 6;
+                Shape::Twist
+            } else {
+                let increments = unknown.input_type.element.increments();
+                increment += increments;
+                if increments == 1 { Shape::Scalar } else { Shape::Vector(u8::try_from(increments).ok()?) }
+            };
+            Some(Owner { name: unknown.name.clone(), increment: first, shape })
+        };
+        entries.map_while(owner).collect()
     }
 
     /// Marks the parameter that `#[time_step(…)]` names.
@@ -237,7 +267,7 @@ impl Signature {
         let (shape, length) = (shape_of(input_type.element), input_type.length);
         let (source, first) = if is_velocity {
             *velocities += length.unwrap_or(1);
-            (Source::Velocity, 3 * (*velocities - length.unwrap_or(1)))
+            (Source::Velocity, 0)
         } else {
             let (source, list) = match section {
                 Section::Moving => (Source::Position, &mut self.moving),
@@ -263,7 +293,9 @@ impl Signature {
             (source, first)
         };
         let is_state = section == Section::State;
-        self.names.push(InputName { name: name.clone(), canonical, source, first, shape, length, is_state });
+        let number = self.names.iter().rfind(|other| other.source == source).map_or(0, |other| other.numbers.end);
+        let numbers = number..number + length.unwrap_or(1);
+        self.names.push(InputName { name: name.clone(), canonical, source, first, shape, length, numbers, is_state });
     }
 }
 
@@ -274,12 +306,6 @@ fn check_group(declaration: &Declaration, group: &InputGroup, diagnostics: &mut 
         diagnostics.push(Diagnostic::new(&group.type_span, message).help(help.to_owned()));
     };
     let is_unknown = group.section == Section::Moving && group.element != ElementType::Velocity;
-    if is_unknown && declaration.kind != Kind::Residual && !can_be_unknown(group.element) {
-        let message = format!("an unknown of this {kind} cannot have this type");
-        let help = "unknowns are Scalar, Vec2, Vec3, Vec4, Point, Point2, Rotation, Motion and arrays of them; parameters \
-                    follow the first `;`, as in (p0, p1: Point; k: Scalar)";
-        report(message, help);
-    }
     if group.shared && !is_unknown {
         report("only unknowns can be `shared`".into(), "put it before the first `;`, or leave out `shared`");
     }
@@ -289,12 +315,6 @@ fn check_group(declaration: &Declaration, group: &InputGroup, diagnostics: &mut 
             format!("this {kind} cannot depend on velocities; declare a force"),
         ));
     }
-}
-
-/// Returns whether energies, constraints and forces can have unknowns of this type.
-fn can_be_unknown(element: ElementType) -> bool {
-    use ElementType::{Motion, Point, Point2, Rotation, Scalar, Vector};
-    matches!(element, Scalar | Vector(_) | Point | Point2 | Rotation | Motion)
 }
 
 /// Maximum count of numbers in an input; more are data.

@@ -107,6 +107,20 @@ impl Program {
         self.kind != Kind::Residual && !self.moving.iter().all(is_own_point)
     }
 
+    /// Returns whether the input that holds a number is a rotation or a motion which nothing differentiates by its
+    /// numbers: a parameter or a part of the rest shape, but not of the state.
+    #[must_use]
+    pub(crate) fn is_given_rotation(&self, source: Source, number: usize) -> bool {
+        let list = match source {
+            Source::Position | Source::Velocity => return false,
+            Source::Rest => &self.rest[..],
+            Source::Parameter => &self.parameters[..self.parameters.len() - self.states],
+        };
+        let holds = |input: &&Input| (input.first..input.first + input.input_type.size()).contains(&number);
+        let element = list.iter().find(holds).map(|input| input.input_type.element);
+        matches!(element, Some(ElementType::Rotation | ElementType::Motion))
+    }
+
     /// Returns the inputs that are the state.
     #[must_use]
     pub fn state(&self) -> &[Input] {

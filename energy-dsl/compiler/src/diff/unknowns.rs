@@ -89,7 +89,7 @@ impl Unknowns {
         let of_unknown = |unknown: &Unknown| {
             let (of, first): (fn(u16) -> Input, usize) = match unknown.kind {
                 FieldKind::Rotation => (Input::Increment, unknown.first_increment),
-                FieldKind::Numbers | FieldKind::Point | FieldKind::TimeStep => (Input::Position, unknown.first_number),
+                _ => (Input::Position, unknown.first_number),
             };
             (first..first + unknown.increments).map(move |number| input(of, number)).collect::<Vec<_>>()
         };

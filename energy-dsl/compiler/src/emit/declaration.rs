@@ -63,7 +63,7 @@ fn borrowed(constant: impl ToTokens) -> TokenStream {
 
 fn field(field: &Field) -> TokenStream {
     let [name, unit] = [&field.name, &field.unit].map(|text| borrowed(&**text));
-    let Field { kind, shared, size, .. } = field;
+    let Field { kind, shared, size, entries, .. } = field;
     let kind = format_ident!("{kind:?}");
     quote! {
         ::energy_dsl::Field {
@@ -71,6 +71,7 @@ fn field(field: &Field) -> TokenStream {
             kind: ::energy_dsl::FieldKind::#kind,
             shared: #shared,
             size: #size,
+            entries: #entries,
             unit: #unit,
         },
     }

@@ -14,7 +14,7 @@ pub(super) fn has_mixed_loops(declaration: &Declaration) -> bool {
     declaration.is_mixed() || !declaration.state.is_empty() || declaration.points.iter().any(turns)
 }
 
-/// Returns the kinds of unknowns that an input holds. Matrices and twists of residuals count as numbers.
+/// Returns the kinds of unknowns that an input holds. Matrices and twists count as numbers.
 fn kinds(field: &Field) -> Vec<String> {
     let (kind, count) = match (field.kind, field.size) {
         (FieldKind::Rotation, _) => ("ENERGY_ROTATION", 1),
@@ -23,7 +23,7 @@ fn kinds(field: &Field) -> Vec<String> {
         (FieldKind::Numbers, 2) => ("ENERGY_VEC2", 1),
         (FieldKind::Numbers, 3) => ("ENERGY_VEC3", 1),
         (FieldKind::Numbers, 4) => ("ENERGY_VEC4", 1),
-        (FieldKind::Numbers | FieldKind::TimeStep, size) => ("ENERGY_SCALAR", size),
+        (FieldKind::Numbers | FieldKind::Motion | FieldKind::TimeStep, size) => ("ENERGY_SCALAR", size),
     };
     let shared = if field.shared { " + ENERGY_SHARED" } else { "" };
     vec![format!("{kind}{shared}"); count]

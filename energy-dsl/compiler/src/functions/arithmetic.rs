@@ -29,7 +29,7 @@ pub(super) const FUNCTIONS: &[Function] = &[
         name: "*",
         usage: "a * b",
         docs: "Product of scalars, matrices, quaternions or dual quaternions, of a matrix and a vector, or of a \
-             scalar and any value.",
+             scalar and any value. For motions, the motion by b, then by a.",
         shape: product,
         units: Units::Product,
         lower: mul,
@@ -79,6 +79,7 @@ fn product(shapes: &[Shape]) -> Result<Shape, String> {
         [Scalar, other] | [other, Scalar] => Ok(other),
         [Shape::Quat, Shape::Quat] => Ok(Shape::Quat),
         [Shape::DualQuat, Shape::DualQuat] => Ok(Shape::DualQuat),
+        [Shape::Motion, Shape::Motion] => Ok(Shape::Motion),
         [Matrix(r, c), Matrix(r2, c2)] if c == r2 => Ok(Matrix(r, c2)),
         [Matrix(r, c), Vector(n)] if c == n => Ok(if r == 1 { Scalar } else { Vector(r) }),
         [Vector(_), Vector(_)] => {
@@ -190,6 +191,7 @@ fn mul(g: &mut Graph, args: &[Lowered]) -> Lowered {
         (Shape::Scalar, _) => scaled(g, a.node(), b),
         (_, Shape::Scalar) => scaled(g, b.node(), a),
         (Shape::Quat | Shape::DualQuat, _) => super::quaternion::product(g, a, b),
+        (Shape::Motion, _) => super::quaternion::motion_after(g, a, b),
         _ => {
             if let Some(stretch) = recognise_stretch(g, a, b) {
                 return stretch;

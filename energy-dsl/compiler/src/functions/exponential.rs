@@ -8,11 +8,16 @@ use crate::graph::{Form, Graph, NodeId, Op, Primitive, Rule};
 pub(super) const FUNCTIONS: &[Function] = &[
     Function {
         name: "log",
-        usage: "log(x)",
-        docs: "Natural logarithm, x > 0. `log(1 + x)` is compiled as `log1p(x)`.",
-        shape: one_scalar,
+        usage: "log(x) or log(q)",
+        docs: "Natural logarithm, x > 0. `log(1 + x)` is compiled as `log1p(x)`. Of a unit quaternion q, its rotation \
+             vector: q turns by the angle |log(q)| ≤ π about it. Regular at the identity. q and −q have the same one; at \
+             half a turn its sign jumps, which is flagged.",
+        shape: |shapes| if shapes == [Shape::Quat] { Ok(Shape::Vector(3)) } else { one_scalar(shapes) },
         units: Units::Plain,
-        lower: |g, a| Lowered::scalar(log(g, a[0].node())),
+        lower: |g, a| match a[0].shape {
+            Shape::Quat => super::rotation_vector::rotation_vector(g, &a[0]),
+            _ => Lowered::scalar(log(g, a[0].node())),
+        },
         accuracy: "1",
     },
     Function {

@@ -5,6 +5,11 @@ use crate::graph::{Form, Graph, NodeId, Op, Primitive, Product, Rule, symmetric_
 
 /// Creates Σ xᵢ yᵢ. For a vector with itself the primitive is half of it, whose derivatives x and 1 need no factors.
 pub(super) fn inner_product(g: &mut Graph, x: &[NodeId], y: &[NodeId]) -> NodeId {
+    if x == y
+        && let Some(square) = super::rotation_vector::recognise_square(g, x)
+    {
+        return square;
+    }
     // x·y and y·x are the same node.
     let (x, y) = if y < x { (y, x) } else { (x, y) };
     if let Some(quotient) = quotient(g, x, y) {

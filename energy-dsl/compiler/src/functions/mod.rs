@@ -23,6 +23,7 @@ mod power_series;
 mod quaternion;
 mod remainder;
 mod rotated;
+mod rotation_vector;
 mod shape;
 mod sinc;
 mod singular;

@@ -207,8 +207,16 @@ fn real(_: &mut Graph, a: &[Lowered]) -> Lowered {
 }
 
 fn conjugate(g: &mut Graph, a: &[Lowered]) -> Lowered {
-    let parts = a[0].parts.iter().enumerate().map(|(i, &p)| if i % 4 == 0 { p } else { g.neg(p) }).collect();
+    let parts: Vec<_> = a[0].parts.iter().enumerate().map(|(i, &p)| if i % 4 == 0 { p } else { g.neg(p) }).collect();
+    if is_unit(g, &a[0].parts) {
+        g.note_origin(&parts, Origin::UnitQuaternion);
+    }
     Lowered { shape: a[0].shape, parts }
+}
+
+/// Returns whether a quaternion is known to have length 1.
+pub(super) fn is_unit(g: &Graph, q: &[NodeId]) -> bool {
+    matches!(g.origin(q), Some(Origin::UnitQuaternion))
 }
 
 /// Returns p q = (p₀ q₀ − p·q, p₀ q + q₀ p + p × q).
@@ -217,6 +225,9 @@ fn hamilton(g: &mut Graph, p: &[NodeId], q: &[NodeId]) -> Vec<NodeId> {
     let sums: Vec<_> = (1..4).map(|i| g.dot(&[p[0], q[0]], &[q[i], p[i]])).collect();
     let mut product = vec![g.sub(real, along)];
     product.extend(plus_cross(g, &sums, &p[1..], &q[1..]));
+    if is_unit(g, p) && is_unit(g, q) {
+        g.note_origin(&product, Origin::UnitQuaternion);
+    }
     product
 }
 
@@ -270,11 +281,25 @@ pub(super) fn inverse_motion(g: &mut Graph, motion: &Lowered) -> Lowered {
     let turned = rotate(g, &back.parts, &motion.parts[..3]);
     let mut parts: Vec<NodeId> = turned.into_iter().map(|part| g.neg(part)).collect();
     parts.extend(back.parts);
+    g.note_origin(&parts, Origin::Inverse { motion: motion.parts.clone() });
+    Lowered { shape: Shape::Motion, parts }
+}
+
+/// Returns the motion by b, then by a.
+pub(super) fn motion_after(g: &mut Graph, a: &Lowered, b: &Lowered) -> Lowered {
+    let position = Lowered::vector(&b.parts[..3]);
+    let mut parts = transform(g, &[a.clone(), position]).parts;
+    parts.extend(hamilton(g, turning(a), turning(b)));
     Lowered { shape: Shape::Motion, parts }
 }
 
 /// Rotates, and translates by w e − w′ u + u × e, with the real part (w, u) and twice the dual part, (w′, e).
 fn transform(g: &mut Graph, a: &[Lowered]) -> Lowered {
+    if let Some(Origin::Inverse { motion }) = g.origin(&a[0].parts).cloned() {
+        // R* (p − x): a difference of points that are far away keeps its digits.
+        let away: Vec<_> = a[1].parts.iter().zip(&motion[..3]).map(|(&p, &x)| g.sub(p, x)).collect();
+        return Lowered::vector(rotate(g, turning(&a[0]), &away));
+    }
     if a[0].shape == Shape::Motion {
         let turned = rotate(g, turning(&a[0]), &a[1].parts);
         let moved = a[0].parts[..3].iter().zip(turned).map(|(&x, turned)| g.add(x, turned));

@@ -2,7 +2,7 @@
 //! c) = a·b + (q a q*)·(τ − c). So b need not be rotated, nor its rotation differentiated.
 
 use super::inner_product::inner_product;
-use super::quaternion::translation;
+use super::quaternion::{is_unit, translation};
 use crate::graph::{Graph, NodeId, Op, Origin};
 
 /// Recognises the product of a rotated vector with a vector that the same unit quaternion transformed, or with the
@@ -13,7 +13,7 @@ pub(super) fn recognise_rotated_product(g: &mut Graph, x: &[NodeId], y: &[NodeId
 
 fn with_rotated(g: &mut Graph, rotated: &[NodeId], other: &[NodeId]) -> Option<NodeId> {
     let Origin::Rotated { quaternion, vector } = g.origin(rotated)?.clone() else { return None };
-    if !matches!(g.origin(&quaternion), Some(Origin::UnitQuaternion)) {
+    if !is_unit(g, &quaternion) {
         return None;
     }
     if let Some((b, shift)) = moved_by(g, &quaternion, other) {

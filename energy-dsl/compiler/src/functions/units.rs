@@ -19,7 +19,8 @@ pub enum Units {
     PowerOfSize(i8),
     /// Returns the product of both arguments' units, part by part if one of them has two.
     Scaled,
-    /// Like `Scaled`; the product of two dual quaternions is p q + ε (p q′ + p′ q).
+    /// Like `Scaled`; the product of two dual quaternions is p q + ε (p q′ + p′ q), and that of two motions has the parts
+    /// of each of them.
     Product,
     /// Returns the quotient of both arguments' units.
     Quotient,

@@ -11,8 +11,12 @@ pub(crate) enum Origin {
     Rotated { quaternion: Vec<NodeId>, vector: Vec<NodeId> },
     /// A vector transformed by a dual quaternion, given by its real part and twice its dual part.
     Transformed { quaternion: Vec<NodeId>, dual: Vec<NodeId>, vector: Vec<NodeId> },
+    /// The inverse of a motion.
+    Inverse { motion: Vec<NodeId> },
     /// A quaternion of length 1, or 0 where that is flagged.
     UnitQuaternion,
+    /// The rotation vector of a unit quaternion (w, v), by |w|, A(|w|) = acos |w| / √(1 − w²) and v.
+    RotationVector { cosine: NodeId, ratio: NodeId, vector: Vec<NodeId> },
     /// The symmetric factor S of F = R S, with its trace and det S = det F.
     Stretch { trace: NodeId, matrix: Vec<NodeId> },
     /// The rotation R of F = R S, with the trace of S.

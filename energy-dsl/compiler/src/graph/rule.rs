@@ -71,6 +71,10 @@ pub enum Primitive {
     ArcSine,
     /// acos x.
     ArcCosine,
+    /// The squared angle of a rotation.
+    SquaredRotation,
+    /// acos w / √(1 − w²), half the angle of a rotation over its sine.
+    ArcOverSine,
     /// atan x.
     ArcTangent,
     /// sinh x.
@@ -171,6 +175,8 @@ impl Primitive {
             Self::Tangent => "tan x",
             Self::ArcSine => "asin x",
             Self::ArcCosine => "acos x",
+            Self::SquaredRotation => "squared angle of a rotation",
+            Self::ArcOverSine => "angle over sine of a rotation",
             Self::ArcTangent => "atan x",
             Self::HyperbolicSine => "sinh x",
             Self::HyperbolicCosine => "cosh x",

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use crate::diagnostic::Diagnostics;
-use crate::syntax::{Body, Expression, ExpressionKind, Item, parse};
+use crate::syntax::{Body, Expression, ExpressionKind, Item, Sum, parse};
 
 /// Returns the body of the last declaration of a text as presentation MathML, one row per `let` and one for the result;
 /// `None` if the text does not parse.
@@ -72,16 +72,19 @@ fn parts(of: &Expression) -> (String, u8) {
             (format!("<msub>{}{}</msub>", expression(of, 5), identifier(&name.text)), 5)
         }
         ExpressionKind::Each(each) => {
-            (format!("<msub>{}{}</msub>", expression(&each.term, 5), identifier(&each.index.text)), 5)
+            (format!("<mo>[</mo>{}<mo>]</mo><msub><mrow/>{}</msub>", expression(&each.term, 0), range(each)), 5)
         }
         ExpressionKind::Sum(sum) => {
-            let index = identifier(&sum.index.text);
-            let (first, end) = (expression(&sum.first, 0), expression(&sum.end, 0));
-            let under = format!("<mrow>{first}<mo>≤</mo>{index}<mo>&lt;</mo>{end}</mrow>");
-            (format!("<munder><mo>∑</mo>{under}</munder>{}", expression(&sum.term, 2)), 2)
+            (format!("<munder><mo>∑</mo>{}</munder>{}", range(sum), expression(&sum.term, 2)), 2)
         }
         ExpressionKind::Body(body) => parts(&body.result),
     }
+}
+
+/// Returns `first ≤ j < end`.
+fn range(sum: &Sum) -> String {
+    let (first, end) = (expression(&sum.first, 0), expression(&sum.end, 0));
+    format!("<mrow>{first}<mo>≤</mo>{}<mo>&lt;</mo>{end}</mrow>", identifier(&sum.index.text))
 }
 
 fn call(name: &str, arguments: &[Expression]) -> (String, u8) {

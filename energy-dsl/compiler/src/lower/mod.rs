@@ -17,7 +17,7 @@ use crate::budget::{Budget, Phase};
 use crate::check::{Program, Source, Typed, TypedKind};
 use crate::diff::{Coordinates, Moving, Order, Unknown, Unknowns, by_increments, first_derivatives};
 use crate::functions::{Lowered, RECOGNISERS, Shape};
-use crate::graph::{Form, Graph, Input, NodeId, count, ordinary};
+use crate::graph::{Form, Graph, Input, NodeId, Origin, count, ordinary};
 use repeated::{LikeTerms, like_terms};
 use spectral::Spectral;
 
@@ -312,6 +312,10 @@ impl<'a> Lowering<'a> {
                     if let Some(rotation) = self.unknowns.rotation(&mut self.graph, first + before) {
                         value.parts.splice(before.., rotation);
                     }
+                }
+                if self.program.is_given_rotation(*source, *first) {
+                    let before = if expression.shape == Shape::Motion { 3 } else { 0 };
+                    self.graph.note_origin(&value.parts[before..], Origin::UnitQuaternion);
                 }
                 value
             }

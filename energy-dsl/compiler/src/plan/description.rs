@@ -50,6 +50,7 @@ fn fields(inputs: &[Input]) -> Cow<'static, [Field]> {
         kind: if input.is_time_step { FieldKind::TimeStep } else { input.input_type.element.field_kind() },
         shared: input.shared,
         size: input.input_type.size(),
+        entries: input.input_type.length.unwrap_or(1),
         unit: Cow::Owned(input.unit.clone()),
     };
     inputs.iter().map(field).collect()

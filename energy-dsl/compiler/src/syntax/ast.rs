@@ -163,6 +163,7 @@ impl ElementType {
         match self {
             Self::Point | Self::Point2 => FieldKind::Point,
             Self::Rotation => FieldKind::Rotation,
+            Self::Motion => FieldKind::Motion,
             _ => FieldKind::Numbers,
         }
     }
@@ -290,10 +291,23 @@ pub struct Let {
 pub struct Next {
     /// Values that only the block knows.
     pub lets: Vec<Let>,
-    /// New values, by the names of the states.
-    pub assignments: Vec<Let>,
+    /// New values of the states.
+    pub assignments: Vec<Assignment>,
     /// Place of the word `next`.
     pub span: Span,
+}
+
+/// `a = value;`, `a[i] = value;` or one of the latter in `for j in first..end { … }`.
+#[derive(Clone, Debug)]
+pub struct Assignment {
+    /// Name of the state.
+    pub name: Name,
+    /// Index of the entry; `None` for the whole state.
+    pub entry: Option<Expression>,
+    /// The index of the loop, and its range.
+    pub range: Option<(Name, Expression, Expression)>,
+    /// New value.
+    pub value: Expression,
 }
 
 impl Body {
@@ -332,13 +346,13 @@ pub enum ExpressionKind {
     Component(Box<Expression>, Name),
     /// `sum(j in first..end, term)`.
     Sum(Box<Sum>),
-    /// `for j in first..end { a[j] = term; }` in `next`: the array of the terms.
+    /// `[term for j in first..end]`, the array of the terms.
     Each(Box<Sum>),
     /// A body in braces or in a string.
     Body(Box<Body>),
 }
 
-/// `sum(index in first..end, term)`.
+/// `sum(index in first..end, term)`, or `[term for index in first..end]`.
 #[derive(Clone, Debug)]
 pub struct Sum {
     /// Index variable.

@@ -144,11 +144,11 @@ impl<'a> Parser<'a> {
                 return self.notation(inner, &span);
             }
             TokenKind::Name(word) if word == "if" => return self.conditional(),
-            TokenKind::Name(word) if is_keyword(word) => return self.fail("a value"),
             TokenKind::Name(word) if !token.notation && habits::statement(word).is_some() => {
                 let (message, help) = habits::statement(word).unwrap_or_default();
                 return Err(Box::new(Diagnostic::new(&span, message).help(help)));
             }
+            TokenKind::Name(word) if is_keyword(word) => return self.fail("a value"),
             TokenKind::Name(_) => return self.name_or_call(),
             TokenKind::Text(_) | TokenKind::Broken(_) => return self.fail("a value"),
             TokenKind::Symbol(symbol) => match symbol.as_str() {
@@ -157,7 +157,7 @@ impl<'a> Parser<'a> {
                     let inner = self.bracketed("(", ")")?;
                     return Ok(inner);
                 }
-                "[" => ExpressionKind::List(self.list("[", "]")?),
+                "[" => return self.array(),
                 "{" => ExpressionKind::Body(Box::new(self.braced_body()?)),
                 "‖" | "|" => return self.barred(symbol),
                 "√" => {
@@ -207,21 +207,52 @@ impl<'a> Parser<'a> {
         let opened = self.span();
         self.expect(open, "to open the list")?;
         self.bars.push(open.into());
-        let mut items = Vec::new();
+        self.items(Vec::new(), close, (open, opened))
+    }
+
+    /// Parses the items of a list, after some of them, up to its end.
+    fn items(&mut self, mut items: Vec<Expression>, close: &str, opened: (&str, Span)) -> Parsed<Vec<Expression>> {
         while !self.is(close) {
             items.push(self.expression()?);
-            if !self.take(",") && !self.is(close) {
-                if let Some(fault) = self.fault() {
-                    return Err(fault);
-                }
-                let error: Parsed<()> = self.fail(&format!("`,` or `{close}`"));
-                let opened = (format!("`{open}` is opened"), opened);
-                return error.map_err(|error| Box::new(error.see(opened))).map(|()| items);
-            }
+            self.separator(close, &opened)?;
         }
         self.at += 1;
         self.bars.pop();
         Ok(items)
+    }
+
+    fn separator(&mut self, close: &str, (open, opened): &(&str, Span)) -> Parsed<()> {
+        if self.take(",") || self.is(close) {
+            return Ok(());
+        }
+        if let Some(fault) = self.fault() {
+            return Err(fault);
+        }
+        let opened = (format!("`{open}` is opened"), opened.clone());
+        self.fail(&format!("`,` or `{close}`")).map_err(|error| Box::new(error.see(opened)))
+    }
+
+    /// Parses `[a, b, …]` or `[term for j in first..end]`.
+    fn array(&mut self) -> Parsed<Expression> {
+        const FORM: &str = "as in [2 * a[j] for j in 0..4]";
+        let span = self.span();
+        self.at += 1;
+        self.bars.push("[".into());
+        let mut items = Vec::new();
+        if !self.is("]") {
+            let term = self.expression()?;
+            if self.take_word_before_name("for") {
+                let (index, first, end) = self.index_range(FORM)?;
+                self.bars.pop();
+                self.expect("]", &format!("after the range, {FORM}"))?;
+                let each = Sum { index, first, end, term };
+                return Ok(Expression { kind: ExpressionKind::Each(Box::new(each)), span });
+            }
+            items.push(term);
+            self.separator("]", &("[", span.clone()))?;
+        }
+        let items = self.items(items, "]", ("[", span.clone()))?;
+        Ok(Expression { kind: ExpressionKind::List(items), span })
     }
 
     /// Parses `‖d‖`, a norm, or `|x|`, an absolute value.

@@ -115,9 +115,10 @@ pub(crate) fn is_mathematics(name: &str) -> bool {
 /// Returns the message and the remedy for a statement of another language.
 pub(super) fn statement(word: &str) -> Option<(&'static str, &'static str)> {
     match word {
-        "for" | "while" | "loop" => {
-            Some(("a formula has no loops", "sum over indices, as in sum(j in 0..4, w[j] * x[j])"))
-        }
+        "for" | "while" | "loop" => Some((
+            "a formula has no loops",
+            "sum over indices, as in sum(j in 0..4, w[j] * x[j]), or list values: [2 * x[j] for j in 0..4]",
+        )),
         "return" => Some((
             "a formula has no `return`",
             "end the body with its result, an expression without `return` and without `;`",

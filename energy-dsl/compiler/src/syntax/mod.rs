@@ -16,8 +16,8 @@ mod text;
 mod tokens;
 
 pub use ast::{
-    AuditRange, AuditScope, Body, Constant, Declaration, ElementType, Expression, ExpressionKind, InputGroup,
-    InputType, Item, Let, Next, Section, Sum, Unit, UserFunction,
+    Assignment, AuditRange, AuditScope, Body, Constant, Declaration, ElementType, Expression, ExpressionKind,
+    InputGroup, InputType, Item, Next, Section, Sum, Unit, UserFunction,
 };
 pub use name::{Name, canonical};
 pub(crate) use notation::without_hat;

@@ -1,6 +1,6 @@
 //! Parses `next { … }`: how the state of an element goes on.
 
-use super::ast::{Expression, ExpressionKind, Let, Next, Sum};
+use super::ast::{Assignment, Next};
 use super::parse::{Parsed, Parser};
 use crate::diagnostic::Diagnostic;
 
@@ -27,40 +27,41 @@ impl Parser<'_> {
                 next.assignments.extend(self.each_entry()?);
                 continue;
             }
-            self.count_definition()?;
-            let name = self.name("the name of a state, as in next { a = b; }, or `let`")?;
-            self.expect("=", "and the new value of the state")?;
-            let value = self.expression()?;
-            self.expect(";", "after the new value")?;
-            next.assignments.push(Let { name, value, rest: false });
+            next.assignments.push(self.assignment("the name of a state, as in next { a = b; }, or `let`")?);
         }
         Ok(Some(next))
     }
 
+    /// Parses `a = value;` or `a[i] = value;`.
+    fn assignment(&mut self, expected: &str) -> Parsed<Assignment> {
+        self.count_definition()?;
+        let name = self.name(expected)?;
+        let entry = if self.take("[") {
+            let index = self.expression()?;
+            self.expect("]", "after the index of the entry")?;
+            Some(index)
+        } else {
+            None
+        };
+        self.expect("=", "and the new value")?;
+        let value = self.expression()?;
+        self.expect(";", "after the new value")?;
+        Ok(Assignment { name, entry, range: None, value })
+    }
+
     /// Parses `j in 0..4 { a[j] = …; … }` after the word `for`.
-    fn each_entry(&mut self) -> Parsed<Vec<Let>> {
+    fn each_entry(&mut self) -> Parsed<Vec<Assignment>> {
         const FORM: &str = "as in for j in 0..4 { a[j] = b[j]; }";
-        let (index, first, end) = self.index_range(FORM)?;
+        let range = self.index_range(FORM)?;
         self.expect("{", FORM)?;
         let mut assignments = Vec::new();
         while !self.take("}") {
-            self.count_definition()?;
-            let (span, name) = (self.span(), self.name(&format!("the name of an array, {FORM}"))?);
-            self.expect("[", &format!("and the index, {FORM}"))?;
-            let place = self.name(&format!("the index `{}`, {FORM}", index.text))?;
-            if place.canonical() != index.canonical() {
-                let message = format!("the entry must be that of the index `{}`", index.text);
-                return Err(Box::new(
-                    Diagnostic::new(&place.span, message).help("a loop gives each entry its own value"),
-                ));
+            let assignment = self.assignment(&format!("the name of an array, {FORM}"))?;
+            if assignment.entry.is_none() {
+                let message = format!("a loop gives new values to entries of `{}`", assignment.name.text);
+                return Err(Box::new(Diagnostic::new(&assignment.name.span, message).help(FORM)));
             }
-            self.expect("]", FORM)?;
-            self.expect("=", "and the new value of the entry")?;
-            let term = self.expression()?;
-            self.expect(";", "after the new value")?;
-            let each = Sum { index: index.clone(), first: first.clone(), end: end.clone(), term };
-            let value = Expression { kind: ExpressionKind::Each(Box::new(each)), span };
-            assignments.push(Let { name, value, rest: false });
+            assignments.push(Assignment { range: Some(range.clone()), ..assignment });
         }
         Ok(assignments)
     }

@@ -386,6 +386,9 @@ impl<'a> Parser<'a> {
             let shared = self.take_word_before_name("shared");
             let mut names = vec![self.name("the name of an input")?];
             while self.take(",") {
+                if shared {
+                    self.take_word_before_name("shared");
+                }
                 names.push(self.name("the name of an input")?);
             }
             self.expect(":", "and the type of the input")?;
@@ -518,7 +521,7 @@ pub(super) fn is_kind_of_declaration(word: &str) -> bool {
 
 /// Returns whether a word is reserved by the language.
 pub(super) fn is_keyword(word: &str) -> bool {
-    matches!(word, "let" | "if" | "else" | "fn" | "rest" | "pub" | "const")
+    matches!(word, "let" | "if" | "else" | "fn" | "for" | "rest" | "pub" | "const")
 }
 
 /// Returns the body as a reader would write it: the contents of a string, or the statements without braces.

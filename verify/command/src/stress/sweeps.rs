@@ -71,11 +71,10 @@ pub fn sweeps(declaration: &Declaration) -> Vec<Sweep> {
 /// Sweeps towards the rest shape, or a rest length if a parameter is one.
 fn at_rest(declaration: &Declaration, ordinary: &Sample) -> Option<Sweep> {
     let inputs: Vec<(f64, Sample)> =
-        if declaration.rest.len() == declaration.points.len() && !declaration.rest.is_empty() {
-            let dimension = declaration.rest[0].size;
+        if let Some((dimension, count)) = declaration.rest_points().filter(|&(_, n)| n == declaration.points.len()) {
             // Halves of integers keep sums with powers of two exact.
             let rest: Vec<f64> = [0.0, 0.0, 1.0, 0.0, 0.5, 1.5].into_iter().cycle().take(3 * dimension).collect();
-            if dimension != 2 || declaration.rest.len() != 3 {
+            if (dimension, count) != (2, 3) {
                 return None;
             }
             let positions = |t: f64| {

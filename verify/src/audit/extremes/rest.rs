@@ -22,11 +22,8 @@ pub(super) struct RestShape {
 impl RestShape {
     /// Returns the rest shape of an input, rounded; `None` for elements without.
     pub(super) fn of(declaration: &Declaration, sample: &Sample) -> Option<Self> {
-        let dimension = declaration.rest.first()?.size;
-        let fits = (2..=3).contains(&dimension)
-            && declaration.rest.len() == declaration.points.len()
-            && declaration.rest.iter().all(|field| field.size == dimension)
-            && has_points(declaration);
+        let (dimension, count) = declaration.rest_points()?;
+        let fits = count == declaration.points.len() && has_points(declaration);
         fits.then(|| Self { dimension, points: sample.rest.iter().map(|&x| dyadic(x)).collect() })
     }
 

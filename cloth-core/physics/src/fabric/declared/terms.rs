@@ -64,7 +64,7 @@ impl Declared {
         }
         let sites = sites(declaration.points.len(), target)
             .ok_or_else(|| unfit(format!("an energy of {} points", declaration.points.len())))?;
-        let has_points_at_rest = declaration.rest.iter().any(|field| field.size == 3);
+        let has_points_at_rest = declaration.rest.iter().any(|field| field.entry_size() == 3);
         if target.mesh.has_patterns() && (has_points_at_rest || declaration.points.len() == 2) {
             let lacking = "which a garment with `rest` or `rest_scale` does not have";
             return Err(unfit(format!("an energy that depends on vertices at rest, {lacking}")));
@@ -122,11 +122,10 @@ impl Declared {
         };
         let parameters = declaration.parameters.iter().map(parameter).collect::<Result<Vec<f64>, _>>()?;
         let at_rest: Vec<Vector3<f64>> = site.vertices.iter().map(|&vertex| target.mesh.vertices()[vertex]).collect();
-        let sizes: Vec<usize> = declaration.rest.iter().map(|field| field.size).collect();
-        let rest = match (&site.corners_in_plane, &sizes[..]) {
-            (_, []) => Vec::new(),
-            (Some(corners_in_plane), [2, 2, 2]) => corners_in_plane.as_flattened().to_vec(),
-            (_, sizes) if sizes.len() == at_rest.len() && sizes.iter().all(|&size| size == 3) => at_rest.concat(),
+        let rest = match (&site.corners_in_plane, declaration.rest_points()) {
+            (_, None) if declaration.rest.is_empty() => Vec::new(),
+            (Some(corners_in_plane), Some((2, 3))) => corners_in_plane.as_flattened().to_vec(),
+            (_, Some((3, count))) if count == at_rest.len() => at_rest.concat(),
             _ => return Err(unfit("an energy whose rest shape is not one point for each of its points".to_owned())),
         };
         Ok((parameters, rest))

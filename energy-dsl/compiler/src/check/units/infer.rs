@@ -7,6 +7,7 @@ use crate::check::constant::evaluate;
 use crate::check::typed::{Input, Program, Source, Typed, TypedKind};
 use crate::diagnostic::{Diagnostic, Diagnostics, Span};
 use crate::functions::Shape;
+use crate::syntax::ElementType;
 
 /// The dimensions of a value: one; two for a dual quaternion (its parts), for a twist (θ and t) and for a motion (rotation
 /// and position).
@@ -165,8 +166,13 @@ impl<'a> Inference<'a> {
         }
     }
 
-    /// Returns the dimension of an unknown. A rotation moves by numbers.
+    /// Returns the dimension of an unknown. A rotation moves by numbers. The position of a motion shares its number with
+    /// the whole motion, whose unit has two parts.
     pub(super) fn unknown(&mut self, unknown: &Input) -> Dimension {
+        let is_known = matches!(unknown.input_type.element, ElementType::Point | ElementType::Rotation);
+        if let Some(known) = declared(unknown).filter(|_| is_known) {
+            return known;
+        }
         self.input(Source::Position, unknown.first, Shape::Scalar).main()
     }
 

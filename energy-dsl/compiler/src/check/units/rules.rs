@@ -95,6 +95,9 @@ fn scaled(call: &Call<'_>) -> Units {
 
 fn product(inference: &mut Inference<'_>, call: &Call<'_>) -> Units {
     let (a, b) = (&call.units[0], &call.units[1]);
+    if call.is(0, Shape::Motion) && call.is(1, Shape::Motion) {
+        return inference.same("*", &[a, b], call.span);
+    }
     if !(call.is(0, Shape::DualQuat) && call.is(1, Shape::DualQuat)) {
         return scaled(call);
     }
