@@ -51,6 +51,19 @@ fn a_material_from_a_file_moves_like_the_built_in_one() {
         folder.path(),
     );
     assert_eq!(points("replaced").len(), points("own").len());
+    // Its points as arrays.
+    let mut arrays = OWN.replace("x0, x1, x2: Point; rest u0, u1, u2: Vec2", "x: [Point; 3]; rest u: [Vec2; 3]");
+    for (name, entry) in
+        [("x0", "x[0]"), ("x1", "x[1]"), ("x2", "x[2]"), ("u0", "u[0]"), ("u1", "u[1]"), ("u2", "u[2]")]
+    {
+        arrays = arrays.replace(name, entry);
+    }
+    std::fs::write(folder.path().join("arrays.energy"), arrays).unwrap();
+    succeeds(
+        &["run", "scene.toml", "-o", "arrays", "--material", "arrays.energy", "--parameters", &parameter],
+        folder.path(),
+    );
+    assert_eq!(points("arrays"), points("replaced"));
     let expect = |text: &str, energy: &str, parts: &[&str]| {
         std::fs::write(folder.path().join("bad.toml"), text).unwrap();
         std::fs::write(folder.path().join("own.energy"), energy).unwrap();

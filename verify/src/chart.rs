@@ -61,7 +61,7 @@ pub(crate) fn product<T: Number>(a: [T; 4], b: [T; 4]) -> [T; 4] {
 
 /// Scales the rotations among the unknowns to unit length.
 pub(crate) fn normalise(declaration: &Declaration, positions: &mut [f64]) {
-    normalise_fields(&*declaration.points, positions);
+    normalise_fields(&declaration.points, positions);
 }
 
 /// Scales rotations, and those of motions, to unit length.

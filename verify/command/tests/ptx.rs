@@ -35,7 +35,7 @@ fn ptx_has_the_operations_of_the_plan() {
         return;
     };
     let elements = KERNELS.map(|(name, _)| interpreted(name));
-    let generated = Generated::new("ptx", &elements);
+    let generated = Generated::new("ptx", &elements, Precision::Single);
     for (name, (element, routine)) in generated.names.iter().zip(KERNELS) {
         let ptx = generated.ptx(&nvcc, name);
         let Counted { found, expected, .. } = generated.counts(name, routine, &ptx);
@@ -44,7 +44,7 @@ fn ptx_has_the_operations_of_the_plan() {
     }
 }
 
-/// All routines of all elements, with points and with any unknowns, in single precision.
+/// All routines of all elements, with points and with any unknowns, in both precisions.
 #[test]
 #[ignore = "takes minutes"]
 fn ptx_of_all_elements_has_the_operations_of_the_plan() {
@@ -56,45 +56,49 @@ fn ptx_of_all_elements_has_the_operations_of_the_plan() {
     let text = include_str!("../../tests/unknowns.energy");
     let mixed = Interpreted::from_file(text, "unknowns.energy").expect("it compiles");
     let elements: Vec<Interpreted> = named.chain(mixed).collect();
-    let generated = Generated::new("ptx-all", &elements);
-    let (mut equal, mut repeated, mut different) = (0, 0, Vec::new());
-    for name in &generated.names {
-        let ptx = generated.ptx(&nvcc, name);
-        for routine in generated.routines(name) {
-            let Counted { found, expected, has_branches } = generated.counts(name, &routine, &ptx);
-            // What follows a branch may be compiled once for each of its ways.
-            let has_all = expected.iter().all(|(name, count)| found.get(name).is_some_and(|found| found >= count));
-            if found == expected {
-                equal += 1;
-            } else if has_branches && has_all {
-                repeated += 1;
-            } else {
-                different.push(format!("{name}_{routine}: {found:?}, text {expected:?}"));
+    for precision in [Precision::Single, Precision::Double] {
+        let generated = Generated::new(&format!("ptx-all-{}", precision.name()), &elements, precision);
+        let (mut equal, mut repeated, mut different) = (0, 0, Vec::new());
+        for name in &generated.names {
+            let ptx = generated.ptx(&nvcc, name);
+            for routine in generated.routines(name) {
+                let Counted { found, expected, has_branches } = generated.counts(name, &routine, &ptx);
+                // What follows a branch may be compiled once for each of its ways.
+                let has_all = expected.iter().all(|(name, count)| found.get(name).is_some_and(|found| found >= count));
+                if found == expected {
+                    equal += 1;
+                } else if has_branches && has_all {
+                    repeated += 1;
+                } else {
+                    different.push(format!("{name}_{routine}: {found:?}, text {expected:?}"));
+                }
             }
         }
+        let others = different.len();
+        println!("{}: {equal} routines equal, {repeated} repeat operations, {others} others", precision.name());
+        assert!(different.is_empty() && equal > 10 * repeated, "{different:#?}");
     }
-    println!("{equal} routines equal, {repeated} with repeated operations, {} others", different.len());
-    assert!(different.is_empty() && equal > 10 * repeated, "{different:#?}");
 }
 
-/// Generated CUDA in single precision, in a folder.
+/// Generated CUDA in one precision, in a folder.
 struct Generated {
     folder: PathBuf,
+    precision: Precision,
     files: Vec<SourceFile>,
     /// Elements, as files name them.
     names: Vec<String>,
 }
 
 impl Generated {
-    fn new(name: &str, elements: &[Interpreted]) -> Self {
+    fn new(name: &str, elements: &[Interpreted], precision: Precision) -> Self {
         let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
         std::fs::create_dir_all(&folder).unwrap();
-        let files = sources(elements, Target::Cuda, &[Precision::Single]).unwrap();
+        let files = sources(elements, Target::Cuda, &[precision]).unwrap();
         for file in &files {
             std::fs::write(folder.join(&file.name), &file.text).unwrap();
         }
         let names = files.iter().filter_map(|file| Some(file.name.strip_suffix(".cu")?.to_owned())).collect();
-        Self { folder, files, names }
+        Self { folder, precision, files, names }
     }
 
     fn text(&self, name: &str) -> &str {
@@ -109,7 +113,7 @@ impl Generated {
         let output = command.arg(source).arg("-o").arg(&ptx).output().unwrap();
         assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
         let ptx = std::fs::read_to_string(ptx).unwrap();
-        assert!(!ptx.contains(".f64"), "{element}: double precision");
+        assert!(self.precision == Precision::Double || !ptx.contains(".f64"), "{element}: double precision");
         ptx
     }
 
@@ -128,7 +132,7 @@ impl Generated {
     }
 
     fn counts(&self, element: &str, routine: &str, ptx: &str) -> Counted {
-        let found = instructions(ptx, &format!("{element}_{routine}_kernel"));
+        let found = instructions(ptx, &format!("{element}_{routine}_kernel"), self.precision.name());
         let Values { counts: expected, has_branches, .. } = operations(self, element, routine);
         Counted { found, expected, has_branches }
     }
@@ -190,17 +194,18 @@ fn interpreted(name: &str) -> Interpreted {
 }
 
 /// Counts the instructions of a kernel. Each is rounded to nearest; sums in memory have no rounding of their own.
-fn instructions(ptx: &str, kernel: &str) -> Counts {
+fn instructions(ptx: &str, kernel: &str, of_type: &str) -> Counts {
     // The name goes on with the length and the name of the argument's type.
     let begin = ["16energy", "22energy"].iter().find_map(|argument| ptx.find(&format!("{kernel}{argument}")));
     let body = &ptx[begin.expect("PTX has the kernel")..];
     let body = &body[..body.find("\n}").expect("the kernel ends")];
     let mut counts = Counts::new();
-    for instruction in body.lines().filter_map(|line| line.split_whitespace().find(|word| word.ends_with(".f32"))) {
+    let ending = format!(".{of_type}");
+    for instruction in body.lines().filter_map(|line| line.split_whitespace().find(|word| word.ends_with(&ending))) {
         let (name, rest) = instruction.split_once('.').expect("it has a type");
         let name = if name == "sub" { "add" } else { name };
         let Some(&(_, name)) = OPERATIONS.iter().find(|(_, of_ptx)| *of_ptx == name) else { continue };
-        assert_eq!(rest, "rn.f32", "{instruction}");
+        assert_eq!(rest, format!("rn.{of_type}"), "{instruction}");
         *counts.entry(name).or_default() += 1;
     }
     counts
@@ -208,8 +213,9 @@ fn instructions(ptx: &str, kernel: &str) -> Counts {
 
 /// Counts the operations of a routine in the generated text. Equal ones with equal operands count once.
 fn operations(generated: &Generated, element: &str, routine: &str) -> Values {
-    let (shared, own) = (generated.text("energy_f32.h"), generated.text(&format!("{element}.h")));
-    let mut values = Values::default();
+    let prefix = format!("energy_{}", generated.precision.name());
+    let (shared, own) = (generated.text(&format!("{prefix}.h")), generated.text(&format!("{element}.h")));
+    let mut values = Values { prefix: format!("{prefix}_"), ..Values::default() };
     for (signature, body) in shared.split("\nENERGY_").skip(1).filter_map(|function| function.split_once(" {")) {
         let body = body.split("\n}").next().unwrap_or_default();
         let has_branches = ["if (", "for (", "? energy_"].iter().any(|branch| body.contains(branch));
@@ -258,6 +264,8 @@ struct Function {
 /// Value numbering of straight-line code.
 #[derive(Default)]
 struct Values {
+    /// What names of functions begin with.
+    prefix: String,
     functions: HashMap<String, Function>,
     /// Numbers of expressions whose operands are numbers.
     known: HashMap<String, usize>,
@@ -299,12 +307,12 @@ impl Values {
                 let name = word.trim_end_matches(|c: char| !(c.is_alphanumeric() || c == '_'));
                 names.get(name).map_or_else(|| word.to_owned(), |number| word.replace(name, &format!("#{number}")))
             });
-            let has = |(name, _): &(&str, &str)| text.contains(&format!("energy_f32_{name}("));
+            let has = |(name, _): &(&str, &str)| text.contains(&format!("{}{name}(", self.prefix));
             assert!(!OPERATIONS.iter().any(has), "operations inside of another expression: {text}");
             return self.number(key.collect());
         };
         let operands: Vec<usize> = arguments(list).iter().map(|operand| self.value(operand, names)).collect();
-        let short = function.trim_start_matches("energy_f32_");
+        let short = function.trim_start_matches(self.prefix.as_str());
         if let Some(&(_, operation)) = OPERATIONS.iter().find(|(name, _)| *name == short) {
             let (before, key) = (self.known.len(), format!("{short}{operands:?}"));
             let number = self.number(key);

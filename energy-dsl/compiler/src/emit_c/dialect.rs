@@ -10,6 +10,14 @@ pub enum Precision {
 }
 
 impl Precision {
+    /// Returns the function that rounds a double to this precision.
+    pub(super) const fn rounding(self) -> fn(f64) -> f64 {
+        match self {
+            Self::Double => |number| number,
+            Self::Single => |number| f64::from(number as f32),
+        }
+    }
+
     /// Returns the suffix of names: `f64` or `f32`.
     #[must_use]
     pub const fn name(self) -> &'static str {

@@ -125,8 +125,8 @@ fn of_precision(elements: &[Interpreted], names: &[String], target: Target, prec
         let name = format!("{name}_{suffix}");
         let declaration = element.declaration();
         let about = [format!("{} {}: {}", declaration.kind.keyword(), declaration.name, declaration.formula)];
-        let written =
-            Element { plan: element.plan(), inputs: element.inputs(), name: &name, dialect, meanings: &meanings };
+        let plan = element.plan().in_precision(precision.rounding());
+        let written = Element { plan: &plan, inputs: element.inputs(), name: &name, dialect, meanings: &meanings };
         let mut add =
             |ending: &str, text: String| files.push(folder::stamped(&format!("{name}{ending}"), &about, &text));
         add(".h", header(&written));

@@ -11,7 +11,7 @@ use crate::graph::{Interpreter, NodeId};
 use crate::inspect::layout::{layout, methods};
 use crate::inspect::textbook::{file_programs, programs};
 use crate::lower::lower;
-use crate::plan::Plan;
+use crate::plan::{Plan, operations};
 use crate::routines::{Routines, differentiate};
 use energy_runtime::{Inputs, Mask, Number, OperationCount, RoutineKind};
 
@@ -157,7 +157,7 @@ impl Listing {
                 .expect("writing to a string succeeds");
         };
         for (graph, routine) in self.routines.all() {
-            row(routine.kind.name(), self.routines.count(graph, &routine.outputs()));
+            row(routine.kind.name(), operations(&self.routines, graph, &routine.outputs()));
         }
         let hessian = self.routines.find(RoutineKind::Hessian);
         let Some([value, gradient, triangle]) = hessian.map(|routine| &routine.groups[..]) else { return text };
@@ -169,7 +169,7 @@ impl Listing {
             for (_, block) in pairs.zip(triangle.chunks(9)).filter(|((i, j), _)| *i != pinned && *j != pinned) {
                 outputs.extend(block);
             }
-            row(&format!("hessian, point {pinned} pinned"), self.routines.count(&self.routines.graph, &outputs));
+            row(&format!("hessian, point {pinned} pinned"), operations(&self.routines, &self.routines.graph, &outputs));
         }
         text
     }

@@ -2,10 +2,12 @@
 
 use std::borrow::Cow;
 
+use super::Code;
 use crate::check::{Input, Program};
-use crate::graph::NodeId;
+use crate::graph::{Graph, NodeId};
+use crate::lower::Repetition;
 use crate::routines::Routines;
-use energy_runtime::{Declaration, Field, FieldKind, Kind, Routine, RoutineKind};
+use energy_runtime::{Declaration, Field, FieldKind, Kind, OperationCount, Routine, RoutineKind};
 
 /// Returns the self-description of an element. It owns its texts and lists.
 pub(super) fn description(program: &Program, routines: &Routines) -> Declaration {
@@ -16,8 +18,8 @@ pub(super) fn description(program: &Program, routines: &Routines) -> Declaration
     let Character { curved, quadratic, velocity_dependent, symmetric } = character(program, routines);
     let list = routines.all().map(|(graph, routine)| Routine {
         name: routine.kind.name(),
-        reduced: routines.count(graph, &routine.reduced_outputs()),
-        full: routines.count(graph, &routine.outputs()),
+        reduced: operations(routines, graph, &routine.reduced_outputs()),
+        full: operations(routines, graph, &routine.outputs()),
     });
     Declaration {
         name: Cow::Owned(program.name.clone()),
@@ -42,6 +44,14 @@ pub(super) fn description(program: &Program, routines: &Routines) -> Declaration
         primitives: Cow::Owned(routines.primitives.clone()),
         routines: list.collect(),
     }
+}
+
+/// Counts the operations that compute some outputs in double precision, in all terms of a sum.
+pub(crate) fn operations(routines: &Routines, graph: &Graph, outputs: &[NodeId]) -> OperationCount {
+    let code = Code::new(graph, &[outputs.to_vec()], [None, None]).in_precision(|number| number);
+    let mut count = OperationCount::default();
+    code.statements.list().iter().for_each(|op| op.add_to(&mut count));
+    count.times(routines.repetition.as_ref().map_or(1, Repetition::terms))
 }
 
 fn fields(inputs: &[Input]) -> Cow<'static, [Field]> {

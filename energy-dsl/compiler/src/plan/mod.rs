@@ -3,9 +3,11 @@
 
 mod description;
 mod groups;
+mod precision;
 mod routine;
 mod statements;
 
+pub(crate) use description::operations;
 pub(crate) use groups::{Shape, groups};
 pub(crate) use routine::{GeneralPlan, RoutinePlan};
 pub(crate) use statements::{Code, RETURNED};

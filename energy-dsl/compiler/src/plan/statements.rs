@@ -11,6 +11,10 @@ pub(crate) struct Statements {
 }
 
 impl Statements {
+    pub(super) fn of(list: Vec<Op>) -> Self {
+        Self { list }
+    }
+
     /// Returns all statements. Those that read an input come just before their first use.
     pub(crate) fn list(&self) -> &[Op] {
         &self.list
@@ -150,6 +154,18 @@ impl Code {
         }
         code.guard = guard.guard.map(|place| places[place.0 as usize]);
         code
+    }
+
+    /// Returns other statements with the same results at other places.
+    pub(super) fn on(&self, statements: Statements, place: impl Fn(NodeId) -> NodeId) -> Self {
+        let masks = |masks: [Option<NodeId>; 2]| masks.map(|mask| mask.map(&place));
+        Self {
+            statements,
+            groups: self.groups.iter().map(|group| group.iter().map(|&at| place(at)).collect()).collect(),
+            flags: masks(self.flags),
+            settled: masks(self.settled),
+            guard: self.guard.map(&place),
+        }
     }
 
     /// Returns the inputs that the statements read, in order.

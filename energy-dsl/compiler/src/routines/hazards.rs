@@ -3,8 +3,9 @@
 use std::collections::BTreeSet;
 
 use super::domain::{Use, Uses, outside, without_limit};
+use super::range::is_length;
 use super::sides::Sides;
-use crate::graph::{Graph, NodeId, Op};
+use crate::graph::{Graph, NodeId, Op, Primitive};
 use energy_runtime::Flag;
 
 /// Masks of the places where a routine needs more than its ordinary path.
@@ -20,6 +21,8 @@ pub(super) struct Hazards {
     pub(super) definite: Option<NodeId>,
 }
 
+/// The degree of a squared length: these guards bound the components of the vector, too.
+const SQUARE: u8 = 2;
 /// Operands up to 2²⁴⁰ (2³⁶ in single precision): their cubes, and those of their reciprocals, are numbers.
 pub(super) const DEGREE: u8 = 3;
 /// e⁸⁰ is a number in single precision, too.
@@ -44,7 +47,8 @@ impl Hazards {
     /// Requires a > 0 of moderate size.
     fn require_moderate(&mut self, g: &mut Graph, a: NodeId) {
         if g.as_constant(a).is_none() {
-            let moderate = g.is_moderate(a, DEGREE);
+            let degree = if is_squared_length(g, a) { SQUARE } else { DEGREE };
+            let moderate = g.is_moderate(a, degree);
             self.require(g, moderate);
         }
     }
@@ -102,7 +106,7 @@ impl Hazards {
         let zero = g.constant(0.0);
         match g.op(node) {
             Op::Div(_, b) if g.as_constant(b).is_none() => {
-                let size = g.abs(b);
+                let size = if is_squared_length(g, b) { b } else { g.abs(b) };
                 self.require_moderate(g, size);
                 let by_zero = g.equal(b, zero);
                 self.flag(g, Flag::Kink, by_zero);
@@ -176,6 +180,15 @@ pub(super) fn hazards(g: &mut Graph, roots: &[(NodeId, u8)]) -> Hazards {
         }
     }
     found
+}
+
+/// Returns whether a number is the square of a difference of points, twice the half that is a primitive.
+fn is_squared_length(g: &Graph, a: NodeId) -> bool {
+    let Op::Mul(x, y) = g.op(a) else { return false };
+    [(x, y), (y, x)].into_iter().any(|(two, half)| {
+        let rule = g.rule(half).filter(|rule| g.is(two, 2.0) && rule.primitive == Primitive::InnerProduct);
+        rule.is_some_and(|rule| rule.arguments.len() < 4 && rule.arguments.iter().all(|&part| is_length(g, part)))
+    })
 }
 
 /// Returns the condition of a selection.

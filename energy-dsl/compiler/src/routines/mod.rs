@@ -15,9 +15,9 @@ use crate::check::Program;
 use crate::diff::{
     Coordinates, Moving, Routes, SecondOrder, Unknowns, first_order, hessian_vector, only_dihedral, second_order,
 };
-use crate::graph::{Graph, Input, NodeId, Op, count, general, ordinary, with_signs_inside};
+use crate::graph::{Graph, Input, NodeId, Op, general, ordinary, with_signs_inside};
 use crate::lower::{Formula, LoweredProgram, Repetition, RestFormula};
-use energy_runtime::{FieldKind, Flag, Kind, OperationCount, RoutineKind};
+use energy_runtime::{FieldKind, Flag, Kind, RoutineKind};
 use hazards::{Hazards, hazards, operations};
 use range::Tests;
 
@@ -211,12 +211,6 @@ impl Routines {
         let own = self.list.iter().map(|routine| (&self.graph, routine));
         let apart = self.apart.iter().flat_map(|all| all.list.iter().map(|routine| (&all.graph, routine)));
         own.chain(apart)
-    }
-
-    /// Counts the operations that compute some outputs, in all terms of a sum.
-    #[must_use]
-    pub fn count(&self, graph: &Graph, outputs: &[NodeId]) -> OperationCount {
-        count(graph, outputs).times(self.repetition.as_ref().map_or(1, Repetition::terms))
     }
 }
 

@@ -265,12 +265,7 @@ impl Analysis {
     fn of(&mut self, g: &Graph, node: NodeId) -> Size {
         let size = |operand: NodeId| self.sizes[&g.resolve(operand)];
         match g.fused(node) {
-            Op::Input(Input::Position(_) | Input::Velocity(_)) => {
-                self.unbounded(node, Unbounded::Length, Size::of_length(2))
-            }
-            Op::Sub(a, b) if is_moving_input(g, a) && is_moving_input(g, b) => {
-                self.unbounded(node, Unbounded::Length, Size::of_length(2))
-            }
+            _ if is_length(g, node) => self.unbounded(node, Unbounded::Length, Size::of_length(2)),
             Op::Input(_) => self.unbounded(node, Unbounded::Parameter, Size::of(self.range.parameter)),
             Op::Constant(bits) => Size::of(exponent_of(f64::from_bits(bits))),
             Op::Neg(a) | Op::Abs(a) => size(a),
@@ -339,6 +334,14 @@ impl Analysis {
 fn exponent_of(constant: f64) -> u32 {
     let exponent = constant.abs().log2().ceil();
     if exponent.is_finite() { exponent.max(0.0) as u32 } else { u32::from(constant != 0.0) * UNKNOWN }
+}
+
+/// Returns whether a number is a coordinate, or a difference of coordinates.
+pub(super) fn is_length(g: &Graph, node: NodeId) -> bool {
+    match g.op(g.resolve(node)) {
+        Op::Sub(a, b) => is_moving_input(g, a) && is_moving_input(g, b),
+        _ => is_moving_input(g, node),
+    }
 }
 
 fn is_moving_input(g: &Graph, node: NodeId) -> bool {

@@ -29,8 +29,8 @@ pub(super) fn module(elements: &[Interpreted], names: &[String], precisions: &[P
         for (element, name) in elements.iter().zip(names) {
             let name = format!("{name}_{}", precision.name());
             let dialect = Dialect { precision, numbers: Numbers::Plain, operators: false };
-            let written =
-                Element { plan: element.plan(), inputs: element.inputs(), name: &name, dialect, meanings: &meanings };
+            let plan = element.plan().in_precision(precision.rounding());
+            let written = Element { plan: &plan, inputs: element.inputs(), name: &name, dialect, meanings: &meanings };
             table.push_str(&row(&written));
             code.push_str(&texts(&written));
             code.push_str(&function::functions(&written));
