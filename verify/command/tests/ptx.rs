@@ -203,7 +203,12 @@ fn instructions(ptx: &str, kernel: &str, of_type: &str) -> Counts {
     let ending = format!(".{of_type}");
     for instruction in body.lines().filter_map(|line| line.split_whitespace().find(|word| word.ends_with(&ending))) {
         let (name, rest) = instruction.split_once('.').expect("it has a type");
-        let name = if name == "sub" { "add" } else { name };
+        // 1 / x is a reciprocal in double precision, rounded alike.
+        let name = match name {
+            "sub" => "add",
+            "rcp" => "div",
+            other => other,
+        };
         let Some(&(_, name)) = OPERATIONS.iter().find(|(_, of_ptx)| *of_ptx == name) else { continue };
         assert_eq!(rest, format!("rn.{of_type}"), "{instruction}");
         *counts.entry(name).or_default() += 1;
