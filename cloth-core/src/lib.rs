@@ -4,8 +4,8 @@
 //!
 //! Modules, from the bottom up; each uses only those above it:
 //!
-//! - [`physics`], a crate of its own: meshes, fabrics, contact, integrators
-//! - [`scene`], a crate of its own: the file format
+//! - [`physics`], a separate crate: meshes, fabrics, contact, integrators
+//! - [`scene`], a separate crate: the file format
 //! - [`mod@measure`]: forces of pins, strain of garments, drape
 //! - [`ledger`], [`model`]: the energy balance, and the assembly of a scene into islands
 //! - [`simulation`], [`output`]: stepping, sleep, saved states; frames, animations and pictures

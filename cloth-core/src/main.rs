@@ -36,7 +36,8 @@ enum Command {
     Sweep(cli::sweep::Sweep),
     /// Measure a finished run, a scene or a mesh: drape coefficient and nodes, strain, extension against force.
     Measure(cli::measure::Measure),
-    /// Test a fabric as a lab does: KES tensile, shear and bending, and Cusick's drape, beside the declared material.
+    /// Test a fabric as a lab does (KES tensile, shear and bending, Cusick's drape), and compare with the declared
+    /// material.
     Test(cli::test::Test),
     /// Write report.html of a finished run: picture, energies, times, evaluation counts, audit of its elements.
     Report(cli::report::Report),

@@ -163,7 +163,7 @@ fn set(scene: &mut Table, path: &str, value: &Value) -> Result<(), SweepError> {
 }
 
 /// Returns a hash of what a run reads: the version of the program, the text of its scene, and the meshes and materials
-/// that the scene names. An invalid scene has none.
+/// that the scene names. An invalid scene contributes no files.
 fn identity(text: &str, path: &Path) -> u64 {
     let version = format!("{}, checkpoints {}\n", env!("CARGO_PKG_VERSION"), Checkpoint::VERSION);
     let files = Scene::parse(text, path).map_or_else(|_| Vec::new(), |scene| scene.input_files());

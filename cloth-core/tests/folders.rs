@@ -1,4 +1,4 @@
-//! Output folders: locks, and what a resumed run checks and repairs.
+//! Output folders: locks, and the checks and repairs of a resumed run.
 
 use std::path::Path;
 use std::process::{Command, Output, Stdio};

@@ -189,7 +189,7 @@ fn what_is_no_fabric_is_refused() {
         assert!(message.contains(part), "{message}");
         assert!(!folder.path().join("out").exists(), "{fabric}");
     }
-    // Elements of its own lie beside the file of the fabric, or where the user allows.
+    // Files of custom elements must be in the fabric's folder, or where the user allows.
     std::fs::create_dir(folder.path().join("mine")).unwrap();
     let own = "[fabric]\ndensity = 0.2\nmaterial.file = { path = \"../own.energy\", parameters = { k = 40.0 } }\n";
     write("mine/fabric.toml", own);

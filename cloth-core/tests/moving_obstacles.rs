@@ -50,7 +50,8 @@ fn steps_are_hardly_rejected_when_balls_hit_cloth() {
         let [solves, rejected] = run(&(hanging(12, density, stiffness) + &ball), 0.1);
         all = [all[0] + solves, all[1] + rejected];
     }
-    // Of forty steps. The count varies with the last bits: 13 of 240 in 24 scenes of this kind, up to 5 in four of them.
+    // The scenes have forty steps together. The number of rejected ones varies with the last bits: 13 of 240 in 24
+    // scenes of this kind, up to 5 in four of them.
     assert!(all[0] < 1800 && all[1] <= 6, "{} linear solves, {} steps rejected", all[0], all[1]);
 }
 

@@ -298,7 +298,7 @@ fn notes_tell_what_contact_does_to_the_start() {
     assert!(near.starts_with(expected) && near.ends_with("or reduce the `thickness` of plane 0"), "{near}");
     let fine = notes(&(head("on", "") + &sheet("cloth", 5, 0.005, [0.0; 3], "")));
     assert!(fine.starts_with("contact gives 36 of 36 vertices less ") && fine.contains("of 1.000 mm"), "{fine}");
-    // Fine cloth beside it does not thin coarse cloth.
+    // Fine cloth does not thin coarse cloth next to it.
     let coarse = sheet("coarse", 5, 0.2, [1.0, 0.0, 0.0], "");
     let both = notes(&(head("on", "") + &sheet("cloth", 5, 0.005, [0.0; 3], "") + &coarse));
     assert!(both.starts_with("contact gives 36 of 72 vertices less "), "{both}");

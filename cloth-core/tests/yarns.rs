@@ -98,7 +98,7 @@ fn woven_fabrics_have_the_strains_that_their_source_prints() {
                     let middle = 0.5 * (low + high);
                     if tester.tension(direction, middle) < load { low = middle } else { high = middle }
                 }
-                // Half of the last digit printed, and what the law misses between its two ends.
+                // Half of the last printed digit, and the error of the law between its two ends.
                 assert!((100.0 * low - printed).abs() < 0.12, "{name} {direction}, {load} N/m: {low} {printed} %");
             }
         }

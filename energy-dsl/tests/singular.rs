@@ -97,7 +97,7 @@ fn outside_the_domain_is_flagged() {
 
 #[test]
 fn a_branch_that_ends_with_the_domain_of_its_condition_is_a_kink() {
-    // Where p.y < 0, the logarithm is not a number, and the comparison fails.
+    // If p.y < 0, the logarithm is NaN, and the comparison fails.
     let edge = DomainEdge::<f64>::new();
     let at = edge.gradient(&[[0.5, 0.0, 0.0]]);
     assert!(at.flags.any(), "{at:?}");

@@ -6,7 +6,7 @@ use energy_dsl::Declaration;
 
 use crate::catalogue::ELEMENTS;
 
-/// Formulas as printed; the other elements are computed as they are printed.
+/// Printed formulas of the elements that are computed differently.
 const PRINTED: &str = include_str!("data/printed.energy");
 
 /// The operations of an element over those of its printed formula.
@@ -17,7 +17,7 @@ const EXCUSED: [(&str, f64, &str); 7] = [
     ("HookeSpring", 1.7, "nine error terms beside 35 operations keep the last digits of a strain of 1e-12"),
     ("Spring", 1.7, "as HookeSpring"),
     ("SphereContact", 1.4, "the same nine terms, of the distance"),
-    ("AsRigidAsPossible", 1.45, "the gradient of (s₁ − 1)² + (s₂ − 1)² that does not cancel at rest"),
+    ("AsRigidAsPossible", 1.55, "the gradient of (s₁ − 1)² + (s₂ − 1)² that does not cancel at rest"),
     ("StableNeoHookeanLog", 1.45, "the gradient of (s₁ − s₂)², and ln(1 + x) − x"),
     ("NeoHookean", 1.6, "the same, near rest and far from it"),
     ("TetStableNeoHookean", 1.55, "the gradient of the invariants of FᵀF − 1, near rest and far from it"),

@@ -32,8 +32,8 @@
 //!
 //! A [`MixedBody`] has scalars (twist angles), vectors of 2 and 3, rotations, and unknowns that all elements share (a
 //! pressure). A [`MixedSystem`] sums [`MixedTerm`]s over it: potentials of mixed unknowns, with or without a state, and
-//! those of points. It returns U, ∂U/∂u by increments, and ∂²U/∂u² as a [`BorderedMatrix`]: a [`KindMatrix`], whose
-//! blocks have the sizes of their unknowns, and dense rows for shared ones. [`MixedNewton`] finds equilibria, and
+//! those of points. It returns U, ∂U/∂u by increments, and ∂²U/∂u² as a [`BorderedMatrix`]. This has a [`KindMatrix`],
+//! whose blocks have the sizes of their unknowns, and dense rows for shared ones. [`MixedNewton`] finds equilibria, and
 //! [`MixedIntegrator`] takes time steps with masses and inertia tensors. [`BorderedSolver`] solves the linear systems,
 //! by a [`BandFactor`] for chains such as rods, otherwise by conjugate gradients.
 //!

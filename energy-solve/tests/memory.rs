@@ -1,4 +1,4 @@
-//! Elements with memory on points: generated ones and those that are read at run time advance alike.
+//! Elements with memory on points: generated ones and those that are read at run time advance in the same way.
 
 use energy_compiler::Interpreted;
 use energy_dsl::tape::Column;

@@ -95,7 +95,7 @@ impl Picture {
 /// Encodes pictures of one size as an animated PNG, which repeats; one picture becomes a plain PNG.
 ///
 /// # Errors
-/// If there are no pictures, their sizes differ, or the encoder fails.
+/// If the list is empty, the sizes of pictures differ, or the encoder fails.
 pub fn film(pictures: &[Picture], per_second: u16) -> Result<Vec<u8>, png::EncodingError> {
     let (width, height) = pictures.first().map_or((0, 0), |picture| (picture.width as u32, picture.height as u32));
     let mut file = Vec::new();

@@ -8,7 +8,7 @@ use std::process::Command;
 use energy_files::drill::Drill;
 use tempfile::TempDir;
 
-/// Returns a folder with a recording of so many frames.
+/// Returns a folder with a recording of this many frames.
 fn folder(frames: usize) -> TempDir {
     let folder = tempfile::tempdir().unwrap();
     let last = (frames - 1).to_string();

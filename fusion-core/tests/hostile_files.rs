@@ -179,7 +179,7 @@ fn numbers_that_are_not_finite_are_refused_with_their_line() {
     assert!(!folder.path().join("out").exists());
 }
 
-/// Results are finite, or there is none: JSON has no word for the others but `null`.
+/// Results with a non-finite number are not written: in JSON it would be `null`.
 #[test]
 fn stored_results_have_no_null() {
     let folder = tempfile::tempdir().unwrap();

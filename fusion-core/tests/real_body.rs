@@ -107,7 +107,7 @@ impl<'a> Run<'a> {
     fn errors(&self, edit: impl Fn(usize, &mut DepthImage)) -> (TrackErrors, usize) {
         let Self { recording, .. } = self;
         let mut body = scaled(&recording.body, self.size);
-        // As `fusion track` does: the first image shows the model at rest.
+        // `fusion track` does the same: the first image shows the model at rest.
         if let Some(fit) = fit_size(&body, &recording.camera, &recording.image(0, self.sensor)) {
             body = fit.applied(&body);
         }

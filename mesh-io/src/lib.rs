@@ -7,7 +7,7 @@
 //! | [`animation`] | binary glTF 2.0 | writes meshes whose vertices move |
 //! | [`usd`] | USD text | writes prims, attributes and time samples as they come |
 //!
-//! Nothing here decides which parts of a file are needed, or what a valid surface or body is.
+//! Callers decide which parts of a file they need, and whether a surface or body is valid.
 //!
 //! Files may come from strangers. The peak of memory of a reader, with its result, is at most 20 times the file and
 //! 300 MB; a file that would need more is refused. The test `memory` of `fuzz-targets` measures it.

@@ -209,7 +209,7 @@ impl Element {
         self.inner.declaration().increments()
     }
 
-    /// Names of the inputs that are the state of an element, which `next` computes anew.
+    /// Names of the inputs that are the state of an element, which `next` updates.
     #[getter]
     fn state(&self) -> Vec<String> {
         self.inner.declaration().state.iter().map(|field| field.name.to_string()).collect()
@@ -275,7 +275,7 @@ impl Element {
     }
 }
 
-/// Copies inputs: numbers as they are, everything else as a new array.
+/// Copies inputs: numbers unchanged, everything else as a new array.
 pub fn copied(py: Python<'_>, inputs: Option<&Bound<'_, PyDict>>) -> PyResult<Py<PyDict>> {
     let (copies, numpy) = (PyDict::new(py), py.import("numpy")?);
     for (name, value) in inputs.into_iter().flatten() {

@@ -4,7 +4,7 @@ use energy_dsl::{Declaration, Field, FieldKind, Number};
 
 /// One unknown of a declaration.
 pub(crate) struct Unknown<'a> {
-    /// The unknown.
+    /// Field of the declaration.
     pub(crate) field: &'a Field,
     /// Index of its first number.
     pub(crate) number: usize,

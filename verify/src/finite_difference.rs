@@ -49,6 +49,13 @@ pub(crate) struct Sweep {
     pub(crate) curve: Vec<(f64, f64, f64)>,
 }
 
+impl Sweep {
+    /// Returns the largest deviation of plain differences, which long steps have.
+    pub(crate) fn largest_deviation(&self) -> f64 {
+        self.curve.iter().map(|&(_, plain, _)| plain).fold(0.0, f64::max)
+    }
+}
+
 /// Compares differences of `lower`, a function of the stepped inputs, with `block`. `None` if hardly any step keeps all
 /// its inputs on the side of the sample, by `is_on_this_side`.
 pub(crate) fn sweep(

@@ -339,7 +339,9 @@ impl<'a> Sampler<'a> {
     }
 
     fn unknown(&mut self, unknown: &Field) -> Vec<f64> {
-        match self.scope.range(&unknown.name) {
+        // Entries of arrays and parts of motions have the range of their input.
+        let input = unknown.name.split(['[', '.']).next().unwrap_or_default();
+        match self.scope.range(input) {
             Some((low, high)) => self.uniforms(unknown.size, low, high),
             None => self.unknowns(unknown.size),
         }

@@ -1,5 +1,5 @@
-//! Potentials that other tools and papers print: random inputs are right to 2e-13, and results at singular inputs are
-//! their limits, or flagged where there is none. Limits are checked along rays in multi-precision.
+//! Potentials that other tools and papers print: random inputs are right to 2e-13. Results at singular inputs are the
+//! limits, or flagged where no limit exists. Limits are checked along rays in multi-precision.
 //!
 //! `POTENTIAL_INPUTS=20,8 cargo test --release -p verify --test all foreign_potentials:: -- --nocapture` takes 20
 //! random and 8 singular inputs for each, and prints the time at singular inputs. `POTENTIAL_SEED` chooses others.

@@ -40,22 +40,30 @@ fn turn(rng: &mut Rng, unknowns: &[Unknown]) -> Option<String> {
     (!found.is_empty()).then(|| found[rng.usize(0..found.len())].clone())
 }
 
+/// Returns `back` and `there` as a product; without the latter if they are of one unknown. What is left of that does not
+/// move: its derivatives are rounding errors.
+fn between(of: [&str; 2], back: &str, there: &str) -> String {
+    if of[0] == of[1] { back.to_owned() } else { format!("{back} * {there}") }
+}
+
 /// Returns a scalar of relative rotations or motions, if there are any.
 fn relative(rng: &mut Rng, unknowns: &[Unknown]) -> Option<String> {
     let motions: Vec<&String> = unknowns.iter().filter(|one| one.0 == "Motion").map(|one| &one.1).collect();
     if !motions.is_empty() && rng.bool() {
         let [a, b] = [(); 2].map(|()| motions[rng.usize(0..motions.len())]);
+        let relative = between([a, b], &format!("inverse({a})"), b);
         let terms = [
-            format!("norm(transform(inverse({a}) * {b} * s, c) - 2 * d)"),
+            format!("norm(transform({relative} * s, c) - 2 * d)"),
             format!("dot(position({a} * s * {b}), rotate(s * {b}, d))"),
         ];
         return Some(terms[rng.usize(0..2)].clone());
     }
     let (a, b) = (turn(rng, unknowns)?, turn(rng, unknowns)?);
+    let relative = between([&a, &b], &format!("conjugate({a})"), &b);
     let terms = [
-        format!("k * norm_squared(log(conjugate({a}) * {b} * g))"),
+        format!("k * norm_squared(log({relative} * g))"),
         format!("cos(norm_squared(log(conjugate(g) * {b})))"),
-        // Where the vector jumps, at half a turn, this does not.
+        // At half a turn the rotation vector jumps, but this does not.
         format!("dot(log({a} * g), d)^2 * (π^2 - norm_squared(log({a} * g)))^3 / 1000"),
     ];
     Some(terms[rng.usize(0..3)].clone())

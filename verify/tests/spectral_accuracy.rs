@@ -16,7 +16,8 @@ use energy_dsl::{Float, Inputs, Mask};
 type Big = FBig<HalfEven, 2>;
 type Matrix = [[Big; 3]; 3];
 
-/// Bits. The squares of condition numbers up to 1e24, and differences of steps of 2⁻¹⁵⁰, keep their digits.
+/// Bits of the significand. The squares of condition numbers up to 1e24, and differences of steps of 2⁻¹⁵⁰, keep their
+/// digits.
 const PRECISION: usize = 640;
 
 fn big(x: f64) -> Big {

@@ -70,7 +70,7 @@ fn opposite_quaternions_give_the_same_bits() {
     }
 }
 
-/// A quaternion that is no rotation is flagged, from one part in a million on.
+/// A quaternion whose length differs from 1 by more than one part in a million is flagged.
 #[test]
 fn quaternions_of_another_length_are_flagged() {
     for element in elements() {

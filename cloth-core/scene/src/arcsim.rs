@@ -39,7 +39,7 @@ pub enum ArcsimError {
     /// A key does not have the expected numbers.
     #[error("`{key}`: expected {wanted}")]
     Numbers {
-        /// The key.
+        /// Name of the key in the file.
         key: &'static str,
         /// The expected numbers.
         wanted: &'static str,

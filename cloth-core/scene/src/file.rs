@@ -54,7 +54,7 @@ pub(super) struct File {
     /// Obstacles that the cloth cannot enter. Default none.
     #[serde(default)]
     obstacles: Vec<ObstacleDescription>,
-    /// Wind. Default still air.
+    /// Wind and its drag. Default still air.
     wind: Option<Wind>,
     /// Acceleration of gravity, in m/s². Default [0, 0, −9.81].
     #[serde(default = "standard_gravity", with = "Reals::<Number, 3>")]
@@ -69,9 +69,9 @@ pub(super) struct File {
     /// Convergence criteria of Newton's method, for the integrators that use it. Default depends on the integrator.
     #[serde(default)]
     tolerances: Tolerances,
-    /// What collides: `on`, `obstacles` or `off`. `on` includes contact of cloth and hair with themselves and with each
-    /// other, and needs the integrator `newton`. Default: `on` for cloth with `newton` and without `sleep`, otherwise
-    /// `obstacles`.
+    /// Which contacts are resolved: `on`, `obstacles` or `off`. `on` includes contact of cloth and hair with themselves
+    /// and with each other, and needs the integrator `newton`. Default: `on` for cloth with `newton` and without
+    /// `sleep`, otherwise `obstacles`.
     #[serde(default)]
     contact: Option<ContactChoice>,
     /// Parts that do not collide with each other. Needs the integrator `newton`. Default none.

@@ -28,7 +28,7 @@ impl Scene {
         paths
     }
 
-    /// Checks that the scene reads files of its own folder and of `allowed` ones only, also through `..` and symbolic
+    /// Checks that the scene reads files only from its folder and the `allowed` ones, also through `..` and symbolic
     /// links. The scene of a stranger should pass it before the files are read: messages quote lines of malformed ones.
     ///
     /// # Errors

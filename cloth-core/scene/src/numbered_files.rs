@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-/// Numbers of files that are no sequence.
+/// File numbers that do not form a sequence.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum NumberingError {

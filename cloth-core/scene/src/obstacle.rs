@@ -246,8 +246,8 @@ impl TryFrom<Keys> for ObstacleDescription {
 }
 
 impl ObstacleDescription {
-    /// Returns the paths of the mesh, one for each frame if it deforms. Relative paths refer to `folder`. Other shapes
-    /// have none.
+    /// Returns the paths of the mesh, one for each frame if it deforms; empty for other shapes. Relative paths refer to
+    /// `folder`.
     #[must_use]
     pub fn mesh_paths(&self, folder: &Path) -> Vec<PathBuf> {
         match &self.shape {

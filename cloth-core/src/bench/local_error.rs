@@ -37,7 +37,7 @@ pub enum LocalErrorFailure {
     Window {
         /// Start of the window, in s.
         start: f64,
-        /// The reason.
+        /// Why the step failed.
         source: Box<SimulationError>,
     },
 }

@@ -6,7 +6,7 @@ use super::print;
 
 #[derive(Debug, Args)]
 pub struct Completions {
-    /// The shell.
+    /// Shell to write the script for.
     shell: Shell,
 }
 

@@ -108,7 +108,7 @@ impl Ledger {
     /// The fraction of the energy put in that an integrator may gain without a warning.
     pub const GAIN: f64 = 1.0;
 
-    /// Lost and gained energies up to this, in J, are no reason to warn.
+    /// Lost and gained energies up to this, in J, cause no warning.
     pub const NEGLIGIBLE: f64 = 1e-12;
 
     /// Creates a ledger with the current state as its first entry. Each body comes with the label of each of its terms;
@@ -173,7 +173,7 @@ impl Ledger {
         &self.works
     }
 
-    /// Whether a ledger from a file has the accounts of so many islands, and columns for all their numbers.
+    /// Whether a ledger from a file has one account per island, and columns for all their numbers.
     pub(crate) fn fits(&self, islands: usize) -> bool {
         let columns = [self.potentials.len(), self.works.len()];
         let has_columns = |account: &Account| {

@@ -56,7 +56,7 @@ pub enum DrapeError {
     /// The disc is not smaller than the specimen.
     #[error("the disc of radius {disc} m is not smaller than the specimen of radius {specimen} m; give both radii")]
     Radii { disc: f64, specimen: f64 },
-    /// There is no cloth.
+    /// The mesh has no triangles.
     #[error("there are no triangles to measure the shadow of")]
     NoCloth,
 }
@@ -75,7 +75,7 @@ impl Drape {
     /// ```
     ///
     /// # Errors
-    /// Returns an error if there are no triangles, or the disc is not smaller than the specimen.
+    /// Returns an error if the mesh has no triangles, or the disc is not smaller than the specimen.
     pub fn measure(
         x: &[Vector3<f64>],
         triangles: &[[usize; 3]],
@@ -125,7 +125,7 @@ mod tests {
     fn a_cone_a_disc_and_waves_have_their_exact_drape() {
         let flat = shaped(|r, _| [r, 0.0]);
         assert!((flat.coefficient - 100.0).abs() < 0.1 && flat.nodes == 0, "{flat:?}");
-        // Beyond the disc the cloth falls at 60°: its shadow ends at 0.09 + 0.06/2 m.
+        // The cloth falls at 60° outside the disc: its shadow ends at 0.09 + 0.06/2 m.
         let cone = shaped(|r, _| if r <= 0.09 { [r, 0.0] } else { [0.09 + 0.5 * (r - 0.09), -(r - 0.09)] });
         let expected = 100.0 * (0.12_f64.powi(2) - 0.0081) / (0.0225 - 0.0081);
         assert!((cone.coefficient - expected).abs() < 0.1 && cone.nodes == 0, "{cone:?}");

@@ -12,7 +12,7 @@ const TAIL: f64 = 0.05;
 /// The distribution of a quantity over the area at rest.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Distribution {
-    /// Mean.
+    /// Mean over the area.
     pub mean: f64,
     /// The value of largest magnitude, with its sign.
     pub largest: f64,

@@ -93,7 +93,7 @@ impl Referents<'_> {
         reasons.map(|(number, reason)| format!("exclude[{number}] has no effect: {reason}")).collect()
     }
 
-    /// Whether each vertex is near a seam; `None` if there is no seam.
+    /// Whether each vertex is near a seam; `None` without seams.
     fn near_seams(&self, distance: f64) -> Option<Vec<bool>> {
         let seams: Vec<Vector3<f64>> = self.sewn.iter().flatten().map(|&vertex| self.x[vertex]).collect();
         let tree = Hierarchy::new(&seams.iter().map(|seam| Bounds::of(&[*seam])).collect::<Vec<_>>());

@@ -245,7 +245,7 @@ impl Model {
         Builder::new(scene, time).model()
     }
 
-    /// Adds a term to an island, with a label of its own, or that of terms with its name and element.
+    /// Adds a term to an island. Terms with the same name and element share a label.
     pub(crate) fn add_term(&mut self, island: usize, term: Box<dyn Term>) {
         let label = TermLabel { name: term.name().to_owned(), element: term.declaration().name.to_string() };
         let known = self.labels.iter().position(|known| *known == label);

@@ -23,7 +23,7 @@ pub(super) struct Creased {
     pub shortest: Vec<f64>,
     /// For each triangle and each edge, which starts at the corner of that index.
     pub edges: Vec<[Edge; 3]>,
-    /// Unit tangent of the curve of sharp edges at each original vertex; zero where there is none, or a corner.
+    /// Unit tangent of the curve of sharp edges at each original vertex; zero at corners and off the curves.
     pub tangents: Vec<Vector3<f64>>,
 }
 
@@ -214,7 +214,7 @@ fn tangents(points: &[Vector3<f64>], sharp: &[[usize; 2]]) -> Vec<Vector3<f64>> 
     points.iter().zip(curves(points, sharp)).map(tangent).collect()
 }
 
-/// Returns the unit vector of a direction, or zero if it has none.
+/// Returns the unit vector of a direction; zero if its length is 0 or not finite.
 pub(super) fn unit_or_zero(direction: Vector3<f64>) -> Vector3<f64> {
     let length = norm(direction);
     if length > 0.0 && length.is_finite() { direction.map(|component| component / length) } else { [0.0; 3] }

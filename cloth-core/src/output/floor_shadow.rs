@@ -113,8 +113,8 @@ impl FloorShadow {
     }
 }
 
-/// Returns the pixel of the shadow before a coordinate, and the part of the way to the next one; `None` if there is
-/// no next one.
+/// Returns the pixel of the shadow before a coordinate, and the fraction of the way to the next one; `None` from the
+/// last pixel on.
 fn cell(coordinate: f32, count: usize) -> Option<(usize, f32)> {
     let coordinate = coordinate.max(0.0);
     let before = coordinate as usize;

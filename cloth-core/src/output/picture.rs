@@ -19,8 +19,8 @@ use crate::scene::Style;
 const HAIR: Colours = [[0.10, 0.05, 0.03], [0.72, 0.46, 0.26]];
 /// The least width of hair, in pixels before downsampling.
 const THINNEST: f64 = 1.5;
-/// Parts of the lamp that cast a shadow on the floor, so many that their borders cannot be told apart, and fewer where
-/// they would cast more triangles than this.
+/// The fewest and the most parts of the lamp. Each casts a shadow on the floor; with the most, the borders of the
+/// shadows cannot be told apart. Fewer are drawn if the shadows would have more triangles than `MOST_SHADOWS`.
 const LAMPS: [usize; 2] = [24, 48];
 const MOST_SHADOWS: usize = 2_000_000;
 

@@ -53,7 +53,7 @@ impl Framing {
     }
 
     /// Frames these points and their shadows, with one camera for all pictures of a sequence. `floor` is the height of
-    /// a plane below them, in m; `None` if there is none.
+    /// a plane below them, in m; `None` without a floor.
     #[must_use]
     pub fn steady(points: &[Vector3<f64>], floor: Option<f64>, style: Style) -> Self {
         let bounds = Bounds::of(points);
@@ -134,7 +134,7 @@ impl Scenery {
         (0..27).filter_map(|number| farthest([0, 1, 2].map(|axis| component(number, axis)))).collect()
     }
 
-    /// The height of the highest horizontal plane at a time in s; `None` if there is none.
+    /// The height of the highest horizontal plane at a time in s; `None` without such planes.
     #[must_use]
     pub fn floor(&self, time: f64) -> Option<f64> {
         self.obstacles.iter().filter_map(|obstacle| floor_height(&obstacle.at(time))).reduce(f64::max)

@@ -161,7 +161,7 @@ impl Drawing {
         frame as f64 / self.frames_per_second
     }
 
-    /// Draws the first frame that has no valid picture. Returns `false` if there is none.
+    /// Draws the first frame that has no valid picture. Returns `false` if all have one.
     fn draw_next(&mut self) -> Result<bool, RunError> {
         match self.drawn.iter().position(|drawn| !drawn) {
             Some(frame) => self.draw(frame).map(|()| true),

@@ -205,7 +205,7 @@ impl Run {
     /// should pass [`Scene::check_paths`] before its files are read.
     ///
     /// # Errors
-    /// As [`Self::resume`], and if the check fails.
+    /// Returns an error as [`Self::resume`] does, or if the check fails.
     pub fn resume_checked(
         output: &Path,
         accept_edited: bool,

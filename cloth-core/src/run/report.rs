@@ -154,7 +154,7 @@ fn page(record: &Record, picture: Option<&[u8]>, plots: &Plots, audit: &[Verdict
     }
     for (title, plot) in [("Energy", &plots.energy), ("Contact", &plots.contact)] {
         if let Some(plot) = plot {
-            // As a picture, a stranger's plot runs no script and reads no other file.
+            // In an `img` element, an untrusted SVG cannot run scripts or load other files.
             let data = STANDARD.encode(plot);
             add(format_args!("<h2>{title}</h2>\n<img alt=\"{title}\" src=\"data:image/svg+xml;base64,{data}\">"));
         }

@@ -128,7 +128,7 @@ impl Island {
     pub(super) fn set_targets(&mut self, targets: &BTreeMap<usize, Vector3<f64>>) {
         let before = std::mem::take(&mut self.targets);
         let had = !before.is_empty();
-        // A pin without a motion of its own stays where it is.
+        // A pin without a motion stays where it is.
         before.iter().for_each(|(vertex, _)| self.body.v[*vertex] = [0.0; 3]);
         if !targets.is_empty() {
             let own = self.vertices.iter().enumerate();
@@ -353,7 +353,7 @@ impl Island {
     }
 
     /// Writes the accelerations of pinned vertices in the last step, given the velocities of the scene before it in
-    /// m/s, to `accelerations` of the scene, in m/s². An island that fell asleep has none.
+    /// m/s, to `accelerations` of the scene, in m/s². An island that fell asleep has zeros.
     pub(super) fn note_accelerations(&self, before: &[Vector3<f64>], dt: f64, accelerations: &mut [Vector3<f64>]) {
         for (local, &vertex) in self.vertices.iter().enumerate() {
             if self.body.system.dofs().row(local).is_none() {

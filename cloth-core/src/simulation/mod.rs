@@ -69,7 +69,7 @@ pub enum SimulationError {
     Release {
         /// The time, in s.
         time: f64,
-        /// The reason.
+        /// Why the pins cannot be released.
         source: Box<SimulationError>,
     },
     /// A control does not fit the scene or the state.
@@ -149,7 +149,7 @@ pub struct Simulation {
     released: usize,
     /// The limit of threads; `None` for one per core.
     threads: Option<usize>,
-    /// What a program controls.
+    /// Inputs that a program controls.
     controlled: Controlled,
 }
 

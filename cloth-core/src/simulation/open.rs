@@ -44,7 +44,7 @@ pub struct OwnElements {
     pub vertices: Vec<usize>,
 }
 
-/// What a program controls in a simulation.
+/// Inputs of a simulation that a program controls.
 #[derive(Clone, Default)]
 pub struct Controls {
     /// Names of the obstacles that it moves, in place of their keys.
@@ -60,7 +60,7 @@ pub struct Controls {
 #[expect(missing_docs, reason = "the messages name the fields")]
 #[non_exhaustive]
 pub enum ControlError {
-    /// There is no such obstacle.
+    /// No obstacle that a program may move has this name.
     #[error(
         "there is no obstacle called `{name}` that a program may move; {}",
         if .known.is_empty() { "there are none".to_owned() } else { format!("there are {}", .known.join(", ")) }
@@ -93,7 +93,7 @@ pub enum ControlError {
     /// A number is not finite.
     #[error("{what}: entry {index} is not finite")]
     NotFinite { what: &'static str, index: usize },
-    /// There is no such vertex.
+    /// The vertex does not exist.
     #[error("there is no vertex {vertex}, only 0 to {}", .vertices.saturating_sub(1))]
     NoSuchVertex { vertex: usize, vertices: usize },
     /// The vertex is not pinned.
@@ -155,7 +155,7 @@ impl SavedPoses {
     }
 }
 
-/// What a program controls, in a running simulation.
+/// State of the inputs that a program controls in a running simulation.
 #[derive(Clone, Default)]
 pub(super) struct Controlled {
     /// The controls that the simulation was created with.

@@ -25,10 +25,11 @@ impl Simulation {
     /// Returns the force of the cloth on what holds each vertex, in N: its exact pin, or the root of a hair. It is zero
     /// for free vertices, also for those that springs pull.
     ///
-    /// It is the residual of the held row, f(x, v) + m (g − c v − a): the forces f of all elements that have a free
-    /// vertex, damping and certified contact included, at the end of the last step, and weight, drag c and inertia of
-    /// the vertex itself, with the acceleration a of the pin in the last step. With `implicit-euler` and `newton` that
-    /// is the equation that the step solved. With other integrators it is the force of the state at its end.
+    /// It is the residual of the held row, f(x, v) + m (g − c v − a). f are the forces, at the end of the last step, of
+    /// all elements that have a free vertex, damping and certified contact included. The rest are weight, drag c and
+    /// inertia of the vertex itself, with the acceleration a of the pin in the last step. With `implicit-euler` and
+    /// `newton` that is the equation that the step solved. With other integrators it is the force of the state at its
+    /// end.
     ///
     /// Elements between held vertices only are not computed. Their forces cancel within one rigid pin.
     #[must_use]

@@ -102,7 +102,7 @@ pub enum RestoreError {
     /// The scene cannot be assembled without the pins that have let go.
     #[error("cannot release pins: {source}")]
     Release {
-        /// The reason.
+        /// Why the pins cannot be released.
         source: Box<SimulationError>,
     },
     /// A term cannot be evaluated at the saved state.

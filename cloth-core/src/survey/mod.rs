@@ -39,10 +39,10 @@ pub enum SurveyError {
     /// The mesh cannot be read.
     #[error(transparent)]
     Mesh(#[from] ObjError),
-    /// There is no garment with this name.
+    /// No garment has this name.
     #[error("there is no garment called `{name}`; there are {}", .known.join(", "))]
     NoSuchGarment { name: String, known: Vec<String> },
-    /// There is no pin or group with this label.
+    /// No pin or group has this label.
     #[error(
         "there is no pin or group `{name}`; there are {}",
         if .known.is_empty() { "none".to_owned() } else { .known.join(", ") }

@@ -36,7 +36,7 @@ impl Pull {
     /// groups. `None` if there are others, or no reading.
     ///
     /// # Errors
-    /// Returns an error if there is no pin or group with a label.
+    /// Returns an error if no pin or group has one of the labels.
     pub fn of(all: &Measurements, between: Option<&[String; 2]>) -> Result<Option<Self>, SurveyError> {
         let Some(first) = all.readings.first() else { return Ok(None) };
         let labels: Vec<String> = all.loads(first).into_iter().map(|(label, _)| label).collect();

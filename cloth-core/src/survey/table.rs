@@ -32,7 +32,7 @@ impl fmt::Display for Survey {
 }
 
 impl Survey {
-    /// Returns the loads on pins and groups at the last reading; `None` if there are none.
+    /// Returns the loads on pins and groups at the last reading; `None` without readings or loads.
     fn loads(&self) -> Option<Table> {
         let all = &self.measurements;
         let loads = all.loads(all.readings.last()?);

@@ -79,7 +79,7 @@ pub(super) fn scene(threads: Threads) -> SceneText {
 }
 
 /// Returns curvature in 1/m and moment per width in N of a bending test: the mean moment along the strip. Where the
-/// clamps also pull, the moment differs from section to section, and its mean is what the turning resists.
+/// clamps also pull, the moment differs from section to section, and the turning is resisted by its mean.
 pub(super) fn curve(measured: &Measurements) -> Curve {
     let point = |(step, reading): (usize, &Reading)| {
         let curvature = curvature(step as i32);

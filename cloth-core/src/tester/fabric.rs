@@ -52,7 +52,7 @@ impl TestedFabric {
         self.scene(&SceneText { head, mesh, tail })
     }
 
-    /// Checks that the fabric reads files of its own folder and of some others only; see [`Scene::check_paths`].
+    /// Checks that the fabric reads files only from its folder and the `allowed` ones; see [`Scene::check_paths`].
     ///
     /// # Errors
     /// Returns an error for the first file that is elsewhere.

@@ -1,7 +1,7 @@
 //! A textile lab: the testers of KES-F and Cusick's drape, as scenes of the simulator.
 //!
-//! Each [`Trial`] is a scene that `cloth run` could run, too. Its curve is read off the loads on the clamps, and stands
-//! beside the *input*: the curve of the declared material on the same mesh, deformed uniformly.
+//! Each [`Trial`] is a scene that `cloth run` could run, too. Its curve is read off the loads on the clamps. It is
+//! compared with the *input*: the curve of the declared material on the same mesh, deformed uniformly.
 //!
 //! Sources: Kawabata (1980), "The standardization and analysis of hand evaluation"; Cusick (1968), "The measurement of
 //! fabric drape", J. Textile Institute 59, 253–260.
@@ -82,9 +82,9 @@ pub enum TesterError {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Threads {
-    /// The warp.
+    /// Warp threads.
     Warp,
-    /// The weft.
+    /// Weft threads.
     Weft,
 }
 
@@ -120,7 +120,7 @@ pub enum Trial {
 }
 
 impl Trial {
-    /// All tests.
+    /// All tests, in the order in which they run.
     pub const ALL: [Self; 6] = [
         Self::Tensile(Threads::Warp),
         Self::Tensile(Threads::Weft),

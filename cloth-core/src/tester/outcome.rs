@@ -21,11 +21,11 @@ const MOMENT_UNIT: f64 = 9.80665e-3;
 pub struct Number {
     /// The name, such as `EMT warp`.
     pub name: String,
-    /// Its unit.
+    /// Unit of the values.
     pub unit: &'static str,
     /// Value of the simulated test; `None` if it does not exist, such as the extension at a load that was not reached.
     pub simulated: Option<f64>,
-    /// Value of the declared material; `None` if it has none.
+    /// Value of the declared material; `None` if it does not exist.
     pub input: Option<f64>,
     /// The simulated number in the unit of KES, with that unit; `None` if it is the same.
     pub kes: Option<(f64, &'static str)>,

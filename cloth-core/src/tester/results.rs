@@ -36,7 +36,7 @@ impl Results {
         text
     }
 
-    /// Plots the simulated curves beside the input, one plot per kind of test: file name and SVG.
+    /// Plots the simulated curves and the input, one plot per kind of test: file name and SVG.
     ///
     /// # Errors
     /// Returns an error if a plot cannot be drawn.

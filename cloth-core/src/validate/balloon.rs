@@ -1,6 +1,6 @@
 //! A Mylar balloon: two discs, sewn at the rim and inflated.
 //!
-//! Of a membrane that does not stretch, but wrinkles freely, the meridian z(x) from the pole to the rim at a keeps its
+//! The membrane does not stretch, but wrinkles freely. Its meridian z(x), from the pole to the rim at x = a, keeps its
 //! length r. Along it z′ = −x²/√(a⁴ − x⁴), so that (Paulsen 1994)
 //!
 //! r = a ∫ dt/√(1 − t⁴), thickness 2 a ∫ t²/√(1 − t⁴) dt, volume 2π a³ ∫ t⁴/√(1 − t⁴) dt

@@ -1,9 +1,9 @@
 //! Folds of stiff cloth on irregular meshes: linear triangles lock, nodal averages of the strain do not.
 //!
-//! * **drape**: a disc of 30 cm on one of 18 cm (Cusick). One cloth with a bending length of 15 mm and a shear stiffness
-//!   of 38.6 N/m, whose tensile stiffness differs. Both rings of vertices next to the edge of the small disc are held, so
-//!   that the clamp is in the middle between them. The exact value is the limit of finer meshes: 49 to 50 % with
-//!   triangles of 500 N/m and edges of 3 mm, and with nodal averages of 20,000 N/m and edges of 4 and 5.5 mm.
+//! * **drape**: a disc of 30 cm on one of 18 cm (Cusick). The cloth has a bending length of 15 mm and a shear stiffness
+//!   of 38.6 N/m; its tensile stiffness varies. Both rings of vertices next to the edge of the small disc are held, so
+//!   that the clamp is in the middle between them. The exact value is the limit of finer meshes, 49 to 50 %. Triangles
+//!   of 500 N/m reach it with edges of 3 mm, and nodal averages of 20,000 N/m with edges of 4 and 5.5 mm.
 //! * **curl**: a free sheet with the natural curvature 25/m. Rolled up, it is at rest; what is left of the energy of the
 //!   flat sheet comes from the mesh. The goal is 1 %. Nodal averages miss it at 22.5 and 37°: the limit is near what they
 //!   have on this very irregular mesh.

@@ -1,5 +1,5 @@
-//! Twelve formulas that the library of elements does not have, beside the C and the Python that SymPy generates for
-//! them. Unlike the kernels, results go to memory, of ten thousand and of a million elements.
+//! Twelve formulas that the library of elements does not have, compared with the C and the Python that SymPy generates
+//! for them. Unlike the kernels, results go to memory, of ten thousand and of a million elements.
 
 pub mod declared;
 mod report;
@@ -21,7 +21,7 @@ type Contender = (Program, Work);
 /// A declared formula, where to evaluate it, and how it runs.
 #[derive(Debug)]
 pub struct Formula {
-    /// Its declaration.
+    /// Declaration with the routines and their costs.
     pub declaration: &'static Declaration,
     /// Its parameters, in the order of the declaration: how many lie in which range.
     constants: &'static [(usize, Range<f64>)],
@@ -112,7 +112,7 @@ macro_rules! tetrahedron {
     };
 }
 
-/// All formulas.
+/// All formulas of `bench --formulas`.
 pub static FORMULAS: [Formula; 12] = [
     Formula::of::<declared::LennardJones>(&[(1, STIFFNESS), (1, 0.7..1.0)], SEGMENT),
     Formula::of::<declared::LaggedFriction>(&[(9, -0.5..0.5), (2, 0.2..0.4), (1, STIFFNESS), (1, 0.2..0.5)], CONTACT),

@@ -1,9 +1,13 @@
 #!/usr/bin/env python3
-"""Counts the operations of the tetrahedra in `short_hessians.rs` as SymPy writes them: common subexpressions of value,
-gradient and upper triangle of the Hessian, with respect to the nine coordinates D of F = D B.
+"""Counts the operations of the formulas in `short_hessians.rs` as SymPy writes them: common subexpressions of value,
+gradient and upper triangle of the Hessian. Tetrahedra are differentiated by the nine coordinates D of F = D B, the
+formulas of `formulas/of_points.energy` by the differences of points to the first one.
 
     pip install sympy && python3 count_with_sympy.py
 """
+
+import pathlib
+import re
 
 import sympy as sp
 
@@ -46,14 +50,66 @@ POTENTIALS = {
 }
 
 
-def operations(potential):
-    D, B = (sp.Matrix(3, 3, sp.symbols(f"{name}0:9")) for name in "DB")
-    potential = potential.subs(dict(zip(F, D * B)))
-    gradient = [sp.diff(potential, x) for x in D]
-    hessian = [sp.diff(gradient[i], D[j]) for i in range(9) for j in range(i, 9)]
+def operations(potential, unknowns):
+    gradient = [sp.diff(potential, x) for x in unknowns]
+    n = len(unknowns)
+    hessian = [sp.diff(gradient[i], unknowns[j]) for i in range(n) for j in range(i, n)]
     shared, results = sp.cse([potential, *gradient, *hessian])
     return sum(sp.count_ops(expression) for expression in [x for _, x in shared] + results)
 
 
+def of_tetrahedron(potential):
+    D, B = (sp.Matrix(3, 3, sp.symbols(f"{name}0:9")) for name in "DB")
+    return operations(potential.subs(dict(zip(F, D * B))), list(D))
+
+
+FUNCTIONS = {
+    "norm": lambda v: sp.sqrt(v.dot(v)),
+    "unit": lambda v: v / sp.sqrt(v.dot(v)),
+    "norm_squared": lambda v: v.dot(v),
+    "dot": lambda x, y: x.dot(y),
+    "cross": lambda x, y: x.cross(y),
+    "angle": lambda x, y: sp.atan2(sp.sqrt(x.cross(y).dot(x.cross(y))), x.dot(y)),
+    "columns": lambda *v: sp.Matrix.hstack(*v),
+    "det": lambda x: x.det(method="berkowitz"),
+    "inverse": lambda x: x.adjugate() / x.det(method="berkowitz"),
+    "transpose": lambda x: x.T,
+    "trace": lambda x: x.trace(),
+    "identity": sp.eye,
+    "ddot": ddot,
+    "exp": sp.exp,
+    "log": sp.log,
+    "sqrt": sp.sqrt,
+}
+SHAPES = {"Scalar": (1, 1), "Vec3": (3, 1), "Mat2x2": (2, 2), "Mat3x3": (3, 3)}
+
+
+def of_points(inputs, formula):
+    """Returns the operations of a formula in the language: but for `let` and `^`, it is Python."""
+    known, unknowns = dict(FUNCTIONS), []
+    for number, part in enumerate(inputs.split(";")):
+        names, kind = part.replace("rest", "").split(":")
+        for place, name in enumerate(names.replace(" ", "").split(",")):
+            if number == 0:
+                point = sp.Matrix(sp.symbols(f"{name}_0:3", real=True)) if place else sp.zeros(3, 1)
+                known[name] = point
+                unknowns += list(point) if place else []
+                continue
+            rows, columns = SHAPES[kind.strip()]
+            symbols = sp.symbols(f"{name}_0:{rows * columns}", real=True, positive=kind.strip() == "Scalar")
+            known[name] = symbols[0] if rows == 1 else sp.Matrix(rows, columns, symbols)
+    formula = re.sub(r"\[(\d)\]\[(\d)\]", r"[\1, \2]", formula.replace("^", "**"))
+    *statements, result = (" ".join(part.split()) for part in formula.split(";"))
+    for statement in statements:
+        name, value = statement.replace("let", "").split("=", 1)
+        known[name.strip()] = eval(value, known)
+    return operations(eval(result, known), unknowns)
+
+
 for name, potential in POTENTIALS.items():
-    print(f"{name:20} {operations(potential):5}", flush=True)
+    print(f"{name:20} {of_tetrahedron(potential):5}", flush=True)
+FOLDER = pathlib.Path(__file__).parent / "formulas"
+DECLARATION = re.compile(r"// (\d+)\nenergy (\w+)\((.*?)\) {\n(?: *rest {(.*?);? }\n)?(.*?)\n}\n", re.DOTALL)
+for recorded, name, inputs, rest, formula in DECLARATION.findall((FOLDER / "of_points.energy").read_text()):
+    formula = f"{rest};{formula}" if rest else formula
+    print(f"{name:20} {of_points(inputs, formula):5}, recorded {recorded}", flush=True)

@@ -87,7 +87,7 @@ pub struct Field {
 }
 
 impl Field {
-    /// Returns the number of scalars of an entry of an array, or of an input that is none.
+    /// Returns the number of scalars of one entry of an array; for other inputs, of the whole input.
     #[must_use]
     pub const fn entry_size(&self) -> usize {
         self.size / self.entries
@@ -188,7 +188,7 @@ pub struct Declaration {
     pub rest: Cow<'static, [Field]>,
     /// Parameters, without the stiffness and damping that every constraint has.
     pub parameters: Cow<'static, [Field]>,
-    /// The state that an element keeps from step to step. It follows the parameters, and is read as they are.
+    /// The state that an element keeps from step to step. It follows the parameters, and is read in the same way.
     pub state: Cow<'static, [Field]>,
     /// Number of rows: 1 for an energy, the length of C or r, one per increment for a force.
     pub rows: usize,
@@ -197,8 +197,8 @@ pub struct Declaration {
     /// Whether points enter only as differences. Proved on the expression graph, as are the next four fields and
     /// `dihedral`.
     pub translation_invariant: bool,
-    /// Whether the second derivatives of the energy, or the position derivatives of the force, are not identically zero
-    /// (as they are for gravity).
+    /// Whether some second derivative of the energy, or some position derivative of the force, is not identically zero.
+    /// `false` for gravity.
     pub curved: bool,
     /// Whether the second derivatives of the energy, or the derivatives of the force, are constant. Then they are
     /// computed only once.
@@ -230,8 +230,8 @@ impl Declaration {
         Some(self.parameters[..place].iter().map(|field| field.size).sum())
     }
 
-    /// Returns whether some unknowns are not points in space that each element has of its own. Such an energy,
-    /// constraint or force has the traits of mixed unknowns. Residuals are not mixed: they have any unknowns.
+    /// Returns whether some unknowns are shared by all elements or are not points in space. Such an energy, constraint
+    /// or force has the traits of mixed unknowns. Residuals are not mixed: they have any unknowns.
     #[must_use]
     pub fn is_mixed(&self) -> bool {
         let is_own_point = |field: &Field| field.kind == FieldKind::Point && field.size == 3 && !field.shared;

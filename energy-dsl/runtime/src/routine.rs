@@ -3,7 +3,7 @@
 pub enum RoutineKind {
     /// The numbers that the rest shape determines, once per element.
     Rest,
-    /// U.
+    /// The energy U.
     Value,
     /// U and ∂U/∂x.
     Gradient,
@@ -13,7 +13,7 @@ pub enum RoutineKind {
     ReducedHessian,
     /// ∂²U/∂x² v.
     HessianVector,
-    /// f.
+    /// The force f.
     Force,
     /// f, ∂f/∂x and ∂f/∂v.
     Jacobians,
@@ -23,7 +23,7 @@ pub enum RoutineKind {
     ConstraintHessian,
     /// U, ∂U/∂x and the triangle of ks Jᵀ J.
     GaussNewton,
-    /// r.
+    /// The residual r.
     Residual,
     /// r and ∂r/∂u.
     Jacobian,

@@ -9,9 +9,9 @@ use energy_dsl::Block;
 pub struct Contact {
     /// The rows of the four vertices in the matrix; [`Contact::FIXED`] for a pinned vertex.
     pub rows: [u32; 4],
-    /// c.
+    /// The coefficients c.
     pub weights: [f64; 4],
-    /// B.
+    /// The block B, in N/m.
     pub block: Block<f64>,
 }
 

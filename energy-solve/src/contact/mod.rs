@@ -2,7 +2,7 @@
 //!
 //! A [`Term`](crate::Term) has fixed stencils and a fixed matrix pattern. Pairs in contact change from iteration to
 //! iteration, so contact is not a term. A [`ContactStep`] lists the stiffness of the pairs in contact as [`Contact`]s
-//! instead. They are added to the matrix where its pattern has their blocks, and solvers take the other blocks beside it
+//! instead. Their blocks are added to the matrix where its pattern has them. Solvers take the other blocks separately
 //! ([`CrossBlocks`](crate::CrossBlocks)).
 
 mod block;

@@ -27,9 +27,9 @@ pub enum BandOrder {
 /// Factorisation A = L D Lᵀ of a banded symmetric matrix, for chains: rods, hairs, trusses.
 ///
 /// With n rows and a half bandwidth w, a factorisation takes n w (w + 3)/2 multiplications and a solve 2 n w, so that
-/// time grows linearly with the length of a chain. There are no row exchanges: D tells how many eigenvalues are
-/// negative (Sylvester's law of inertia), and a positive definite matrix needs no pivoting. For indefinite ones, refine
-/// the solution.
+/// time grows linearly with the length of a chain. Rows are not exchanged: D tells how many eigenvalues are negative
+/// (Sylvester's law of inertia), and a positive definite matrix needs no pivoting. For indefinite ones, refine the
+/// solution.
 ///
 /// ```
 /// use energy_solve::{BandFactor, BandOrder, KindMatrix, KindPattern};

@@ -46,7 +46,7 @@ pub enum BorderedError {
     NotConverged {
         /// Number of iterations.
         iterations: usize,
-        /// The reason.
+        /// Why they stopped.
         stopped: StopReason,
     },
 }
@@ -60,8 +60,8 @@ pub enum BorderedError {
 /// A multiplier of a constraint is a maximised unknown whose part of C is zero. Then A need not be definite, nor does
 /// its sum with the other terms: only where the constraint keeps its value.
 ///
-/// Conjugate gradients iterate on what is left once the maximised unknowns are eliminated, A − B C⁻¹ Bᵀ, bordered by
-/// the minimised unknowns.
+/// Conjugate gradients first eliminate the maximised unknowns, and iterate on A − B C⁻¹ Bᵀ, bordered by the minimised
+/// unknowns.
 #[derive(Debug)]
 pub struct BorderedSolver {
     inner: Inner,

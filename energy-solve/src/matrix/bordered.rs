@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use super::kinds::{KindMatrix, KindPattern};
 
-/// The symmetric matrix [A B; Bᵀ C]: A over the unknowns that each element has of its own, sparse, and C over *shared*
-/// unknowns, small and dense. Shared unknowns are coupled to everything, so they are kept out of the sparse pattern.
+/// The symmetric matrix [A B; Bᵀ C]: A is sparse, over the unknowns that are not shared. C is small and dense, over
+/// *shared* unknowns. Shared unknowns are coupled to everything, so they are kept out of the sparse pattern.
 ///
 /// Vectors have the increments of A's unknowns, in the order of [`KindPattern`], and then the shared ones.
 ///

@@ -9,7 +9,7 @@ use crate::matrix::vector::add_scaled_block;
 /// returns their blocks, summed, and solvers take the sum of the matrix and these blocks.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct CrossBlocks {
-    /// Where the blocks of each row begin, and their end; empty if there are none.
+    /// Index of the first block of each row, then the number of blocks; empty without blocks.
     row_start: Vec<u32>,
     columns: Vec<u32>,
     blocks: Vec<Block<f64>>,
@@ -56,7 +56,7 @@ impl CrossBlocks {
         sums
     }
 
-    /// Whether there are no blocks.
+    /// Whether the list is empty.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.blocks.is_empty()

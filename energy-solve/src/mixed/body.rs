@@ -50,7 +50,7 @@ impl std::fmt::Display for UnknownKind {
     }
 }
 
-/// What an equilibrium is in a shared unknown.
+/// Kind of equilibrium in a shared unknown.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Extremum {
     /// A minimum of the potential, as in all other unknowns.

@@ -12,7 +12,7 @@ use energy_dsl::{
 /// Batches check their arguments; terms pass ranges and outputs that fit.
 const FITS: &str = "ranges, unknowns and outputs fit";
 
-/// Where elements are evaluated.
+/// Values of the unknowns at which elements are evaluated.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Configuration<'a> {
     /// The numbers of all unknowns.
@@ -195,7 +195,7 @@ pub(super) trait Elements: Debug + Send + Sync {
         gradients: &mut [f64],
         triangles: &mut [f64],
     ) -> usize;
-    /// Returns the states of all elements; empty if they have none.
+    /// Returns the states of all elements; empty for elements without a state.
     fn states(&self) -> Vec<f64>;
     /// Replaces the states of all elements.
     fn set_states(&mut self, states: &[f64]);

@@ -13,7 +13,10 @@ pub enum MixedError {
         stencils: usize,
     },
     /// A stencil has too few or too many unknowns for the element's declared ones.
-    #[error("{term}: element {element} of {declared} declared unknowns does not fit its {found} unknowns")]
+    #[error(
+        "{term}: element {element} has {numbers} numbers in {declared} declared unknowns, and its stencil lists {found} \
+         unknowns that do not have as many"
+    )]
     WrongCount {
         /// Name of the term.
         term: String,
@@ -21,6 +24,8 @@ pub enum MixedError {
         element: usize,
         /// Number of declared unknowns.
         declared: usize,
+        /// Numbers of the declared unknowns. Several unknowns of the body may make up one, as three vectors a matrix.
+        numbers: usize,
         /// Number of unknowns in the stencil.
         found: usize,
     },
@@ -33,11 +38,11 @@ pub enum MixedError {
         element: usize,
         /// Name of the declared unknown.
         field: String,
-        /// What it takes: "a rotation", or "3 numbers".
+        /// Description of the expected kind: "a rotation", or "3 numbers".
         expected: String,
         /// Index of the body's unknown.
         unknown: usize,
-        /// Its kind.
+        /// Description of the unknown's kind.
         found: String,
     },
     /// A stencil names an unknown that does not exist.
@@ -67,7 +72,7 @@ pub enum MixedError {
     /// A body has no unknown of this index.
     #[error("the body has {count} unknowns, so there is none with index {unknown}")]
     NoSuchUnknown {
-        /// The index.
+        /// Requested index.
         unknown: usize,
         /// Number of unknowns.
         count: usize,
@@ -95,7 +100,7 @@ pub enum MixedError {
     WrongInertia {
         /// Index of the unknown.
         unknown: usize,
-        /// What the unknown takes.
+        /// Description of the expected inertia.
         expected: &'static str,
         /// The given inertia.
         found: String,
@@ -107,7 +112,7 @@ pub enum MixedError {
         what: &'static str,
         /// Index within the vector.
         index: usize,
-        /// The number.
+        /// The infinite number or NaN.
         value: f64,
     },
     /// A rotation is further than 1e-6 from unit length.
@@ -115,7 +120,7 @@ pub enum MixedError {
     NotUnit {
         /// Index of the unknown.
         unknown: usize,
-        /// Its length.
+        /// Norm of the quaternion.
         norm: f64,
     },
     /// A derivative of an element, or its next state, is infinite or NaN.

@@ -63,12 +63,12 @@ pub(super) struct InertialPotential {
     time: f64,
     /// The mass of each flat unknown that has one.
     masses: Vec<(u32, f64)>,
-    /// Their numbers.
+    /// Numbers of the unknowns with a mass.
     flat: Vec<Flat>,
     turning: Vec<Turning>,
 }
 
-/// Where free motion leads a number of a flat unknown.
+/// Target of free motion for a number of a flat unknown.
 #[derive(Clone, Copy, Debug)]
 struct Flat {
     mass: f64,
@@ -79,7 +79,7 @@ struct Flat {
     increment: u32,
 }
 
-/// Where free motion leads a rotation, and the inertia tensor in space there.
+/// Target of free motion for a rotation, and the inertia tensor in space there.
 #[derive(Clone, Copy, Debug)]
 struct Turning {
     unknown: usize,

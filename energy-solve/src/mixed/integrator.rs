@@ -38,9 +38,10 @@ impl MixedState {
 
 /// Integrates the motion of a body with inertia under the potential of a system.
 ///
-/// A step of implicit Euler minimises U(u) + Σ ½ m ‖x − x̃‖²/h² + Σ (2/h²) vᵀ J v. x̃ = x + h ẋ and q̃ are where free
-/// motion leads, v is the vector part of q q̃⁻¹ and J the inertia tensor there. q̃ keeps the angular momentum (midpoint
-/// rule); the torque of the minimum times h is its change, so that it is exact up to rounding and the tolerance.
+/// A step of implicit Euler minimises U(u) + Σ ½ m ‖x − x̃‖²/h² + Σ (2/h²) vᵀ J v. Free motion leads to x̃ = x + h ẋ
+/// and q̃. J is the inertia tensor there, and v the vector part of q q̃⁻¹. Free motion keeps the angular momentum
+/// (midpoint rule). The change of the momentum is the torque at the minimum times h, so that it is exact up to rounding
+/// and the tolerance.
 ///
 /// Unknowns without inertia, and shared ones, are in equilibrium with the others at the end of each step; with the
 /// midpoint rule, at its middle.

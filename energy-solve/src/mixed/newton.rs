@@ -108,9 +108,9 @@ pub enum MixedNewtonError {
 
 /// Halvings of one step before the search gives up.
 const MOST_HALVINGS: usize = 40;
-/// Halvings that are no reason for more damping.
+/// More halvings than this in one step increase the damping.
 const FEW_HALVINGS: usize = 3;
-/// What is added to the diagonal of projected Hessians, relative to the stiffest entry.
+/// Least damping: an addition to the diagonal of projected Hessians, relative to the stiffest entry.
 const LEAST_DAMPING: f64 = 1e-9;
 const MOST_DAMPING: f64 = 100.0;
 /// The part of the decrease of the linear model that a step must achieve (Armijo).

@@ -24,7 +24,7 @@ pub(super) struct Rows {
     pub(super) multipliers: Vec<bool>,
 }
 
-/// Where the derivatives of a term's elements go.
+/// Scatter map: places of the derivatives of a term's elements in the body's gradient and matrix.
 #[derive(Debug)]
 pub(super) struct Scatter {
     /// The unknowns of an element: position of the first increment, and number of increments.

@@ -117,7 +117,7 @@ impl MixedSystem {
         BorderedMatrix::zeros(&self.rows.pattern, &self.rows.maximised).with_multipliers(&self.rows.multipliers)
     }
 
-    /// Returns the name of each term, and what was evaluated and skipped since the system was created.
+    /// Returns the name of each term, and its counts of evaluated and skipped elements since the system was created.
     pub fn counts(&self) -> impl Iterator<Item = (&str, Counts)> {
         self.terms.iter().map(|summed| (summed.term.name.as_str(), summed.counts))
     }

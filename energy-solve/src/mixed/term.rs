@@ -174,8 +174,13 @@ impl MixedTerm {
     ) -> Result<(), MixedError> {
         let (fields, first) = (&*self.declaration.points, unknowns.len());
         let term = || self.name.clone();
-        let wrong_count =
-            || MixedError::WrongCount { term: term(), element, declared: fields.len(), found: stencil.len() };
+        let wrong_count = || MixedError::WrongCount {
+            term: term(),
+            element,
+            declared: fields.len(),
+            numbers: self.declaration.unknowns(),
+            found: stencil.len(),
+        };
         let mut given = stencil.iter().copied();
         for field in fields {
             let (which, count, start) = if field.shared {
@@ -193,6 +198,7 @@ impl MixedTerm {
                 if !self.takes(field, kind, left) {
                     let expected = match field.kind {
                         FieldKind::Rotation => "a rotation".to_owned(),
+                        _ if left < field.size => format!("{} numbers, of which {left} are left", field.size),
                         _ => format!("{left} numbers"),
                     };
                     return Err(self.wrong_kind(element, &field.name, expected, unknown, kind));

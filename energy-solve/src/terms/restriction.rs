@@ -21,7 +21,7 @@ impl Restriction<'_> {
     }
 
     /// Returns the index, in the restricted matrix, of a block of the whole matrix;
-    /// [`Pattern::nowhere`](crate::Pattern::nowhere) if it has none.
+    /// [`Pattern::nowhere`](crate::Pattern::nowhere) if the block is left out.
     #[must_use]
     pub fn slot(&self, slot: u32) -> u32 {
         self.slots[slot as usize]

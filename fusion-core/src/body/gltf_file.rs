@@ -63,7 +63,7 @@ pub fn read_gltf(path: &Path) -> Result<SkinnedBody, GltfError> {
 /// Reads the contents of a file as [`read_gltf`] does. `path` is used in messages.
 ///
 /// # Errors
-/// As [`read_gltf`].
+/// Returns the errors of [`read_gltf`], except for unreadable files.
 ///
 /// ```
 /// use std::path::Path;
@@ -77,7 +77,7 @@ pub fn parse_gltf(bytes: &[u8], path: &Path) -> Result<SkinnedBody, GltfError> {
     })
 }
 
-/// Why there is no body in a file.
+/// Why a file does not contain a body.
 #[derive(Debug)]
 enum Unusable {
     Part(Fault),

@@ -25,7 +25,7 @@ pub struct TrackOutput {
     camera: Camera,
     triangles: Vec<[u32; 3]>,
     frames_per_second: f64,
-    /// Timestamps of the images in s; `None` if they have none.
+    /// Timestamps of the images in s; `None` without timestamps.
     times: Option<Vec<f64>>,
     /// Pictures of the film; `None` without pictures.
     pictures: Option<Vec<Picture>>,

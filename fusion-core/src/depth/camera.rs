@@ -77,7 +77,7 @@ impl Camera {
     /// Returns a description of an invalid parameter; `None` if all are valid.
     #[must_use]
     pub fn fault(&self) -> Option<&'static str> {
-        // Beyond these, products of coordinates may overflow.
+        // Outside of these limits, products of coordinates may overflow.
         let fits = |focal_length: f64| (1e-3..=1e9).contains(&focal_length);
         if !(fits(self.fx) && fits(self.fy)) {
             return Some("expected focal lengths greater than 0: from 0.001 to 1e9 pixels");

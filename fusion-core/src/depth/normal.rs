@@ -69,7 +69,7 @@ impl DepthImage {
 /// The normals of one image. Each is fitted once, when it is first asked for.
 #[derive(Clone, Debug)]
 pub struct NormalMap<'a> {
-    /// The image.
+    /// Image to fit the normals to.
     pub image: &'a DepthImage,
     /// The rays of its pixels.
     pub rays: &'a PixelRays,

@@ -40,7 +40,7 @@ pub enum SequenceError {
         path: PathBuf,
         /// Line number, from 1.
         line: usize,
-        /// The line.
+        /// Text of the line.
         found: String,
     },
     /// Timestamps do not increase.
@@ -94,7 +94,7 @@ pub enum SequenceError {
         path: PathBuf,
         /// Line number, from 1.
         line: usize,
-        /// The path.
+        /// Path in the list.
         found: String,
     },
 }

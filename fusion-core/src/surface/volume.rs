@@ -119,8 +119,8 @@ impl SurfaceVolume {
     /// A moved voxel x meets the point u with the normal n, measured in its pixel. Its distance n·(x − u) counts with
     /// the weight cos α/z²: α is the angle between n and the ray, and the information of a depth falls with its square.
     /// Voxels more than τ behind the surface are hidden and stay unchanged. So do voxels whose part of the model does
-    /// not face as the measured surface does, unless they lie in free space, and voxels in front of a part of the model
-    /// that is far from them at rest: a hand may pass in front of a thigh.
+    /// not face as the measured surface does, unless they lie in free space. Voxels also stay unchanged in front of a
+    /// part of the model that is far from them at rest: a hand may pass in front of a thigh.
     pub fn integrate(
         &mut self,
         model: &DeformationModel,

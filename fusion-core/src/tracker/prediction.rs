@@ -24,7 +24,7 @@ struct Velocity {
     turn: Vector3<f64>,
 }
 
-/// What a prediction remembers of the last frames.
+/// Stored state of a prediction: motions of the last frame, and velocities.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct PredictionState {

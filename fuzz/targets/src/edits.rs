@@ -8,7 +8,7 @@ const LONGEST: usize = 16_384;
 /// Applies one or more edits to one of the inputs. `words` are pieces of text to insert.
 ///
 /// # Panics
-/// If there are no inputs.
+/// If `inputs` is empty.
 ///
 /// ```
 /// let mut random = fastrand::Rng::with_seed(1);

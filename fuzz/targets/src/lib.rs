@@ -40,7 +40,7 @@ pub const TARGETS: [Target; 20] = [
 /// Returns the target of this name.
 ///
 /// # Panics
-/// If there is none.
+/// If no target has this name.
 #[must_use]
 pub fn target(name: &str) -> &'static Target {
     TARGETS.iter().find(|target| target.name == name).unwrap_or_else(|| panic!("no target has the name {name}"))

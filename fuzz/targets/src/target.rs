@@ -7,7 +7,7 @@ pub const PATIENCE: Duration = Duration::from_secs(5);
 /// The longest message, in bytes, besides what it quotes of the input. Programs cut messages at 16,000 characters.
 const LONGEST_MESSAGE: usize = 4000;
 
-/// A reader.
+/// A reader to test with edited inputs.
 #[derive(Clone, Copy, Debug)]
 pub struct Target {
     /// Name of the program and of the folders of seeds and regressions.

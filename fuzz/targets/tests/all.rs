@@ -23,7 +23,7 @@ fn variable(name: &str) -> Option<f64> {
     std::env::var(name).ok().map(|text| text.parse().unwrap_or_else(|_| panic!("{name} is not a number")))
 }
 
-/// Where inputs are kept: the one that runs, in case it ends the process, and those that failed.
+/// Path of a kept input: the one that runs, in case it ends the process, or one that failed.
 fn kept(name: &str) -> PathBuf {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("fuzz");
     std::fs::create_dir_all(&folder).unwrap();

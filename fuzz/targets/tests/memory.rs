@@ -1,6 +1,6 @@
 //! The peak of memory of the readers of meshes, over a seeded family of hostile files: at most 20 times the file and
-//! 300 MB, and 2 s until a file is refused. A program of its own, because it counts the bytes of all allocations: each
-//! file is read in another process.
+//! 300 MB, and 2 s until a file is refused. This test is a separate program, because it counts the bytes of all
+//! allocations: each file is read in another process.
 #![cfg(target_os = "linux")]
 
 use std::alloc::System;

@@ -64,8 +64,8 @@ impl Usage {
     }
 }
 
-/// The numbers of a file. Together, no more are read than the file has bytes of data: accessors that share bytes, or
-/// have none, do not multiply.
+/// The numbers of a file. All accessors together read at most one number per byte of data: those that share bytes, or
+/// have none, cannot multiply the memory.
 #[derive(Debug)]
 pub struct Accessors<'a> {
     file: &'a Container<'a>,
@@ -73,7 +73,7 @@ pub struct Accessors<'a> {
     budget: u64,
 }
 
-/// The checked elements of an accessor, of `N` numbers each. They are decoded as they are visited.
+/// The checked elements of an accessor, of `N` numbers each. Each is decoded when it is visited.
 #[derive(Clone, Debug)]
 pub struct Values<'a, const N: usize> {
     count: usize,

@@ -34,9 +34,9 @@ impl Fault {
 /// A file whose description is valid in itself; accessors are not checked yet.
 #[derive(Debug)]
 pub struct Container<'a> {
-    /// The description.
+    /// The parsed JSON description.
     pub root: Root,
-    /// The data.
+    /// The embedded binary data.
     pub data: &'a [u8],
 }
 
@@ -44,7 +44,7 @@ impl<'a> Container<'a> {
     /// Parses a file, and checks the references of its description.
     ///
     /// # Errors
-    /// If the file is no binary glTF with embedded data, or its description is malformed or too large.
+    /// If the file is not a binary glTF with embedded data, or its description is malformed or too large.
     ///
     /// ```
     /// let fault = mesh_io::gltf::Container::parse(b"no glTF").unwrap_err();
@@ -130,7 +130,7 @@ fn check_positions(root: &Root) -> Result<(), Fault> {
     Ok(())
 }
 
-/// Returns the first error that the validation of `gltf_json` finds; `None` if there is none.
+/// Returns the first error that the validation of `gltf_json` finds; `None` for a valid file.
 fn first_error(root: &Root) -> Option<Fault> {
     let mut first = None;
     root.validate(root, gltf_json::Path::new, &mut |path, error| {

@@ -1,4 +1,4 @@
-//! The contents of an OBJ file, as they are written in it.
+//! The unprocessed contents of an OBJ file.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -47,7 +47,7 @@ pub struct Corner {
     normal: u32,
 }
 
-/// Stands for no texture coordinate or normal. Files are too small for so many.
+/// Marks a missing texture coordinate or normal. Files are too small to have this index.
 const NONE: u32 = u32::MAX;
 
 impl Corner {
@@ -70,7 +70,7 @@ impl Corner {
     }
 }
 
-/// A polygon.
+/// A polygon of a surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Face {
     /// Range of its corners in the file's.
@@ -117,7 +117,7 @@ struct Malformed {
     text: String,
 }
 
-/// The groups, object and material of the following faces, and what the file may still have.
+/// The groups, object and material of the following faces, and the remaining budgets of the file.
 #[derive(Default)]
 struct Current {
     groups: Vec<u32>,

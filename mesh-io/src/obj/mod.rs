@@ -1,7 +1,7 @@
 //! Wavefront OBJ files, as exporters write them.
 //!
 //! [`ObjFile`] has the vertices, texture coordinates and faces of a file with their lines and groups. It makes no mesh:
-//! readers decide which faces they need and what a valid mesh is.
+//! readers decide which faces they need and whether a mesh is valid.
 //!
 //! A file may come from a stranger. It is a regular file of at most [`LARGEST_FILE`] bytes. A face has at most
 //! [`MOST_CORNERS`] corners and [`MOST_NAMES`] groups, a file [`MOST_FILE_NAMES`] names. A file of n bytes has at most

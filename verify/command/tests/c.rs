@@ -203,7 +203,7 @@ fn compiled(compiler: &Compiler, elements: &[Interpreted], precision: Precision,
     program
 }
 
-/// Numbers of what was compared.
+/// Numbers of compared routines, and of flagged and unsettled elements.
 #[derive(Debug, Default)]
 pub struct Counts {
     pub routines: usize,
@@ -310,7 +310,7 @@ impl<S: Bits> Suite<S> {
         self.only(&chosen)
     }
 
-    /// Returns the chosen elements, numbered anew.
+    /// Returns the chosen elements, renumbered from 0.
     pub fn only(self, chosen: &[usize]) -> Self {
         let of = |elements: &[Interpreted]| chosen.iter().map(|&number| elements[number].clone()).collect();
         let renumbered = |case: Case<S>| {
@@ -322,7 +322,7 @@ impl<S: Bits> Suite<S> {
     }
 }
 
-/// Compares all elements of a suite; `None` if there is no such compiler.
+/// Compares all elements of a suite; `None` without this compiler.
 pub fn check<S: Bits>(compiler: &Compiler, name: &str, suite: impl FnOnce() -> Suite<S>) -> Option<Counts> {
     if !compiler.exists() {
         println!("skipped: there is no {}", compiler.command[0]);

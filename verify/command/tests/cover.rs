@@ -1,5 +1,5 @@
-//! Which elements suffice: text in other languages is compared element by element, and their compilers take minutes for
-//! all of them.
+//! A choice of elements that covers all routines and operations: compilers of other languages take minutes for all
+//! elements.
 
 use std::collections::BTreeSet;
 

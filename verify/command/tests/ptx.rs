@@ -63,7 +63,7 @@ fn ptx_of_all_elements_has_the_operations_of_the_plan() {
             let ptx = generated.ptx(&nvcc, name);
             for routine in generated.routines(name) {
                 let Counted { found, expected, has_branches } = generated.counts(name, &routine, &ptx);
-                // What follows a branch may be compiled once for each of its ways.
+                // Code after a branch may be compiled once for each side.
                 let has_all = expected.iter().all(|(name, count)| found.get(name).is_some_and(|found| found >= count));
                 if found == expected {
                     equal += 1;
@@ -145,7 +145,7 @@ struct Counted {
     has_branches: bool,
 }
 
-/// The kernels of the book compile without warnings. Those for RXMesh need its headers and what they include, in the
+/// The kernels of the book compile without warnings. Those for RXMesh need its headers and their dependencies, in the
 /// folders that `RXMESH_INCLUDE` lists.
 #[test]
 fn kernels_of_the_book_compile() {
@@ -203,7 +203,7 @@ fn instructions(ptx: &str, kernel: &str, of_type: &str) -> Counts {
     let ending = format!(".{of_type}");
     for instruction in body.lines().filter_map(|line| line.split_whitespace().find(|word| word.ends_with(&ending))) {
         let (name, rest) = instruction.split_once('.').expect("it has a type");
-        // 1 / x is a reciprocal in double precision, rounded alike.
+        // 1 / x is a reciprocal in double precision, with the same rounding.
         let name = match name {
             "sub" => "add",
             "rcp" => "div",
@@ -269,7 +269,7 @@ struct Function {
 /// Value numbering of straight-line code.
 #[derive(Default)]
 struct Values {
-    /// What names of functions begin with.
+    /// Prefix of the names of functions.
     prefix: String,
     functions: HashMap<String, Function>,
     /// Numbers of expressions whose operands are numbers.

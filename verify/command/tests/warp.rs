@@ -45,7 +45,7 @@ macro_rules! bits {
 bits!(f64, Double);
 bits!(f32, Single);
 
-/// Returns a Python that has Warp, or says why there is none.
+/// Returns a Python that has Warp; otherwise prints why the test is skipped.
 fn python() -> Option<String> {
     let program = std::env::var("WARP_PYTHON").unwrap_or_else(|_| "python3".to_owned());
     let found = Command::new(&program).args(["-c", "import warp"]).output();

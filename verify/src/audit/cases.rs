@@ -76,7 +76,7 @@ const SCALES: [f64; 4] = [0.5, 0.25, 0.125, 0.0625];
 pub(super) struct Cases<'a> {
     pub(super) list: Vec<Case<'a>>,
     /// Inputs that were drawn and at which the formula has no value, as in the logarithm of an inverted element's
-    /// volume: their number, and the first ones.
+    /// volume, or a value beyond the range of doubles: their number, and the first ones.
     pub(super) outside: usize,
     pub(super) outside_inputs: Vec<Sample>,
     /// Inputs that were not found in the domain.
@@ -114,7 +114,7 @@ struct Drawing<'a> {
 }
 
 impl Drawing<'_> {
-    /// Draws an input at which the formula has a value; `None` if there seems to be none.
+    /// Draws an input at which the formula has a value in the range of doubles; `None` if there seems to be none.
     fn sample(&mut self, is_lattice: bool) -> Option<Sample> {
         for attempt in 0..ATTEMPTS {
             let is_lattice = is_lattice && attempt == 0;
@@ -153,7 +153,7 @@ impl Drawing<'_> {
     }
 
     fn is_inside(&mut self, sample: &Sample) -> bool {
-        let is_outside = self.subject.is_outside(sample);
+        let is_outside = self.subject.is_unusable(sample);
         if is_outside {
             self.outside += 1;
             if self.outside_inputs.len() < 2 {

@@ -4,6 +4,7 @@ use energy_compiler::{Part, Parts};
 use energy_dsl::{Declaration, Number};
 use fastrand::Rng;
 
+use super::remedy::domain;
 use super::subject::Subject;
 use crate::formula::{JetInputs, order};
 use crate::jet::{Jet, Order};
@@ -42,7 +43,7 @@ pub(super) fn culprit(subject: &Subject, sample: &Sample, block_order: usize, er
     };
     let worst = (0..errors.len()).filter(arises).max_by(|&a, &b| errors[a].total_cmp(&errors[b]).then(b.cmp(&a)));
     let Some(part) = worst.map(|index| &parts.list()[index]) else { return compiled() };
-    Culprit { subexpression: Some(part.text.clone()), proposal: proposal(part).into() }
+    Culprit { subexpression: Some(part.text.clone()), proposal: proposal(part, &subject.declaration) }
 }
 
 /// Returns the input, and others of slightly different parameters: at a single one, rounding errors may happen to
@@ -96,9 +97,9 @@ fn derivatives<T: Number>(jet: &Jet<T>, order: usize) -> Vec<T> {
 }
 
 /// Returns a spelling that keeps the digits, chosen by the functions of a subexpression.
-fn proposal(part: &Part) -> &'static str {
+fn proposal(part: &Part, declaration: &Declaration) -> String {
     let has = |text: &str| part.text.contains(text);
-    match part.function {
+    let proposal = match part.function {
         "log" => "near 1, `log1p(y)` of y = x − 1 keeps the digits if y is computed without this subtraction",
         "exp" => "`expm1(x)` is exp(x) − 1 without cancellation",
         "singular_values" | "rotation_of" | "stretch_of" => {
@@ -120,6 +121,9 @@ fn proposal(part: &Part) -> &'static str {
         "+" | "-" | "*" | "^" | "det" | "dot" | "ddot" | "trace" => {
             "the terms cancel: write them in a quantity that is small there, such as the strain E = (FᵀF − I)/2"
         }
-        _ => "write it in a quantity that is small there, or state the domain: #[audit(domain(strain = 0.5..2.0))]",
-    }
+        _ => {
+            return format!("write it in a quantity that is small there, or state the domain: {}", domain(declaration));
+        }
+    };
+    proposal.into()
 }

@@ -9,15 +9,12 @@ use super::auditor::{Auditor, Finding};
 use super::cases::Case;
 use super::entry::entry_name;
 use super::momentum::momentum_errors;
+use super::remedy::domain;
 use super::report::Check;
 use crate::blocks::{Answer, Block, BlockName, NoAnswer, largest};
 use crate::eigenvalues::eigenvalues;
 use crate::formula::rows;
 use crate::sample::{Sample, has_points};
-
-/// The remedy for a formula that overflows at inputs where nobody uses it.
-const OUT_OF_DOMAIN: &str =
-    "\n  if the formula is not used there, state where it is, as in #[audit(domain(strain = 0.5..2.0))]";
 
 impl Auditor<'_> {
     /// Checks every law at one input.
@@ -49,11 +46,12 @@ impl Auditor<'_> {
             self.note(Check::Finite, block.name, error, sample, || match bad {
                 Some(entry) => {
                     format!(
-                        "  entry {} is {}, at{}",
+                        "  entry {} is {}, at{}\n  if the formula is not used there, state where it is, as in {}",
                         entry_name(declaration, block, entry),
                         block.numbers[entry],
-                        sample.describe(declaration)
-                    ) + OUT_OF_DOMAIN
+                        sample.describe(declaration),
+                        domain(declaration)
+                    )
                 }
                 None => format!("  flagged as degenerate or a kink, at{}", sample.describe(declaration)),
             });
@@ -65,7 +63,7 @@ impl Auditor<'_> {
         let Ok(answer) = self.answer(sample) else { return };
         let Some(block) = answer.blocks.first() else { return };
         if !rows(&self.subject.formula, sample).iter().any(|row| row.is_nan()) {
-            // Only the next state has no value. Its routine has flags of its own.
+            // The value overflows, or only the next state has none. Its routine has separate flags.
             return;
         }
         let error = if answer.flags[0].degenerate { 0.0 } else { f64::INFINITY };

@@ -14,6 +14,7 @@ mod losses;
 mod momentum;
 mod mutations;
 mod properties;
+mod remedy;
 mod report;
 mod routes;
 mod subject;
@@ -164,11 +165,8 @@ fn run(subject: &Subject, energy: Option<&Subject>, options: Options) -> Result<
     let samples = declared.unwrap_or(options.samples);
     let Cases { list: cases, outside, outside_inputs, missing } = cases(subject, samples, options.truths, options.seed);
     if cases.is_empty() && samples > 0 {
-        return Err(
-            "the formula has no value at any input tried; state where it has one, as in #[audit(domain(strain = \
-                    0.5..2.0))]"
-                .into(),
-        );
+        let domain = remedy::domain(&subject.declaration);
+        return Err(format!("the formula has no value at any input tried; state where it has one, as in {domain}"));
     }
     let mut auditor = Auditor::new(subject);
     let mut section = Section { outside, ..section(subject, cases.len()) };
@@ -263,6 +261,7 @@ fn section(subject: &Subject, inputs: usize) -> Section {
         extremes: 0,
         warnings: Vec::new(),
         outside: 0,
+        domain: remedy::domain(declaration),
         left_out: Vec::new(),
         mutations: None,
     }

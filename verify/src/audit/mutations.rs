@@ -162,7 +162,7 @@ fn rare_branches<'a>(
             continue;
         }
         let turn = sampler.rotation();
-        if subject.is_outside(&sample) {
+        if subject.is_unusable(&sample) {
             continue;
         }
         let case = Case::new(subject, sample, turn, true);

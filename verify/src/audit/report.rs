@@ -298,8 +298,12 @@ pub struct Section {
     pub extremes: usize,
     /// Losses of digits near rest and near singularities, one for each block and kind of place.
     pub warnings: Vec<Warning>,
-    /// Number of random inputs that were replaced, because the formula has no value there.
+    /// Number of random inputs that were replaced, because the formula has no value there, or a value near the end of
+    /// the range of doubles.
     pub outside: usize,
+    /// An attribute that states a domain.
+    #[serde(skip)]
+    pub domain: String,
     /// Checks that the budget of the element left out; empty if all were made.
     pub left_out: Vec<String>,
     /// Planted faults; `None` if the source of the element is not available.
@@ -333,8 +337,11 @@ impl Report {
             format!("{element}: no differences at {none} of {inputs} inputs, too near to a kink or a boundary.")
         });
         let outside = self.sections.iter().filter(|section| section.outside > 0).map(|section| {
-            let Section { element, outside, .. } = section;
-            format!("{element}: {outside} random inputs were replaced, because the formula has no value there.")
+            let Section { element, outside, domain, .. } = section;
+            format!(
+                "{element}: {outside} random inputs were replaced, because the formula has no value in the range of \
+                 doubles there; a domain says where it is used, as in {domain}."
+            )
         });
         let beyond_budget = self.sections.iter().filter(|section| !section.left_out.is_empty()).map(|section| {
             let Section { element, left_out, .. } = section;

@@ -100,7 +100,11 @@ impl Auditor<'_> {
         let scale = scale.max(self.natural_size(&case.sample, answer, block.name));
         let vanishes = routes.iter().filter(|route| route.check != Some(Check::FiniteDifferences));
         let scale = match vanishes.map(|route| largest(route.numbers)).fold(0.0, f64::max) {
-            0.0 => scale.max(self.size_of_derivatives(&case.sample, answer, block.name)),
+            0.0 => {
+                // If derivatives of all orders vanish, as at the minimum of x⁴, differences still fall with their steps.
+                let of_long_steps = differences.map_or(0.0, |(_, sweep)| sweep.largest_deviation());
+                scale.max(self.size_of_derivatives(&case.sample, answer, block.name)).max(of_long_steps)
+            }
             _ => scale,
         };
         let order = differences.and_then(|(_, sweep)| sweep.order);

@@ -221,6 +221,19 @@ impl Subject {
         })
     }
 
+    /// Whether the value of the formula is so large that derivatives may be beyond the range of doubles, such as that of
+    /// an exponential function of large strains.
+    fn overflows(&self, sample: &Sample) -> bool {
+        self.meter.formula();
+        let largest = 2.0_f64.powi(900);
+        rows(&self.formula, sample).into_iter().any(|row| row.abs() > largest)
+    }
+
+    /// Whether nothing can be compared at an ordinary input: it is outside of the domain, or the value overflows.
+    pub(super) fn is_unusable(&self, sample: &Sample) -> bool {
+        self.is_outside(sample) || self.overflows(sample)
+    }
+
     /// Returns a sampler of the domain that the declaration states.
     #[must_use]
     pub fn sampler(&self, seed: u64) -> Sampler<'_> {

@@ -13,7 +13,8 @@ pub(super) const LENGTH: f64 = 1e-4;
 /// The cosine between the normals of two pairs with one feature in common, above which they are the same contact.
 const SAME_CONTACT: f64 = 0.5;
 
-/// How much shorter than its full length a deflection may be in a pair that slips: the normal turns from step to step.
+/// The fraction by which the deflection of a slipping pair may fall short of `LENGTH`: the normal turns from step to
+/// step.
 const SLIPPING: f64 = 1e-3;
 
 /// The kind of pairs of edges in names.

@@ -50,7 +50,7 @@ impl FeasibleRegions<'_> {
         let mut touched = (0..3).filter(is_touched).map(|corner| corners[corner]);
         match (touched.next(), touched.next(), touched.next()) {
             (Some(_), Some(_), Some(_)) => true,
-            // A rail.
+            // A rail is a triangle with two equal corners.
             _ if corners[1] == corners[2] => true,
             (Some(a), Some(b), None) => on_edge(self.mesh, self.x, [a, b], corners, closest.normal),
             (Some(a), None, None) => on_vertex(self.mesh, self.x, point, a, corners),

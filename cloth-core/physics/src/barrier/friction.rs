@@ -123,7 +123,7 @@ impl Friction {
         (self.bristles, self.lagged) = (Bristles::restored(memory), None);
     }
 
-    /// Creates the friction of bodies and obstacles that have none.
+    /// Creates a model without friction for bodies and this number of obstacles.
     pub fn frictionless(obstacles: usize) -> Self {
         Self { obstacles: vec![ObstacleFriction::default(); obstacles], ..Self::default() }
     }

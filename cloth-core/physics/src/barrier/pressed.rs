@@ -50,7 +50,7 @@ impl BarrierContact {
         let against = |one: &Push<'_>| {
             pushes.iter().filter(|other| other.opposes(one)).max_by(|a, b| a.force.total_cmp(&b.force))
         };
-        // Of the two features that push each other the most, the one that something pushes back is wedged.
+        // The strongest contact pushes two features apart. The one that is pushed back harder is wedged.
         let both = pushes.iter().filter(|push| push.force == largest).map(|push| (push, against(push)));
         let force = |back: &Option<&Push<'_>>| back.map_or(0.0, |push| push.force);
         let (push, back) = both.max_by(|(_, one), (_, other)| force(one).total_cmp(&force(other)))?;

@@ -102,7 +102,7 @@ ranges! {
     Channel: (0.0, true), (1.0, true); "a number from 0 to 1", "numbers from 0 to 1"; "";
     /// Angles of a camera.
     Angle: (0.1, true), (170.0, true); "an angle from 0.1 to 170", "angles from 0.1 to 170"; "";
-    /// Stretches.
+    /// Stretches: lengths relative to those at rest.
     AboveOne: (1.0, false), (LARGEST, true); "a number greater than 1", "numbers greater than 1";
         "no thread stretches that far";
 }

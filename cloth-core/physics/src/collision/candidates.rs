@@ -18,7 +18,7 @@ impl Candidates {
         Self { pairs, separations: Separations::default() }
     }
 
-    /// The pairs.
+    /// All candidate pairs, in order.
     pub fn pairs(&self) -> &[Pair] {
         &self.pairs
     }

@@ -26,7 +26,7 @@ pub struct Unmeasured<'a> {
 /// The closest points of consecutive pairs at one state.
 #[derive(Clone, Copy, Debug)]
 pub struct MeasuredPart<'a> {
-    /// The pairs.
+    /// The pairs of this part, in order.
     pub pairs: &'a [Pair],
     numbers: &'a [[f64; 8]],
     separations: &'a [f64],

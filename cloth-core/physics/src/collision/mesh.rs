@@ -210,7 +210,7 @@ impl CollisionMesh {
         &self.edges
     }
 
-    /// The triangles.
+    /// The vertices of each triangle.
     #[must_use]
     pub fn triangles(&self) -> &[[u32; 3]] {
         &self.triangles
@@ -226,7 +226,7 @@ impl CollisionMesh {
         &self.neighbours[vertex as usize]
     }
 
-    /// The first triangle at a vertex; `None` if it has none.
+    /// The first triangle at a vertex; `None` if no triangle has it.
     pub(crate) fn first_triangle(&self, vertex: u32) -> Option<[u32; 3]> {
         self.first_triangles[vertex as usize]
     }

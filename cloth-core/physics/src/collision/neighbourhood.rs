@@ -36,7 +36,7 @@ struct Fixed {
     origin: Vector3<f64>,
     /// Whether each vertex moves.
     moving: Vec<bool>,
-    /// The pairs before. Where no vertex moves, they stay as they are.
+    /// The pairs before the restriction; those without a moving vertex stay valid.
     candidates: Candidates,
 }
 

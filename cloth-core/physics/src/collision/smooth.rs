@@ -89,7 +89,7 @@ impl<'a> Shapes<'a> {
     }
 
     /// The radius around their paths in which vertices may stay so that no block has pairs within twice the distance
-    /// `half`, in m. Negative if there is none.
+    /// `half`, in m. Negative if no radius suffices.
     pub fn clear_radius(&self, half: f64) -> f64 {
         self.apart.iter().map(|apart| radius(*apart, half)).fold(f64::INFINITY, f64::min)
     }
@@ -284,7 +284,8 @@ fn product([p, q]: [Vector3<f64>; 2], [a, b]: [Vector3<f64>; 2]) -> [[f64; 2]; 2
     [[dot(p, a), dot(p, b)], [dot(q, a), dot(q, b)]]
 }
 
-/// The rows of the matrix P with P R = 1 and the least norm, for R given by columns. NaN or infinite if there is none.
+/// The rows of the matrix P with P R = 1 and the least norm, for R given by columns. NaN or infinite if the columns are
+/// parallel.
 fn left_inverse([a, b]: [Vector3<f64>; 2]) -> [Vector3<f64>; 2] {
     let [[aa, ab], [_, bb]] = product([a, b], [a, b]);
     let determinant = aa * bb - ab * ab;

@@ -108,7 +108,7 @@ proptest! {
         }
     }
 
-    /// Where pairs are not measured again, they keep a lower bound of their distance, and are out of reach.
+    /// Pairs that are not measured again keep a lower bound of their distance, and are out of reach.
     #[test]
     fn separations_stay_lower_bounds(
         [x, y] in impact(),

@@ -86,7 +86,7 @@ impl Trees {
         Self { points, triangles, edges, first }
     }
 
-    /// Whether there are no features. A plane is a triangle without points and edges.
+    /// Whether the trees are empty. A plane is a triangle without points and edges.
     pub fn is_empty(&self) -> bool {
         self.points.is_empty() && self.triangles.is_empty() && self.edges.is_empty()
     }

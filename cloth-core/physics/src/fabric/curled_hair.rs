@@ -141,7 +141,7 @@ struct Strand {
 impl Strand {
     /// Iterations at most. A strand that moves a little needs two.
     const ITERATIONS: usize = 20;
-    /// Steps below this, in rad, are taken as they are.
+    /// Steps below this, in rad, are taken without a check of the energy.
     const SMALL: f64 = 1e-6;
 
     fn new(hair: &Curled, edges: &[Edge], rooted: bool) -> Self {
@@ -239,7 +239,7 @@ impl Strand {
                 // Rounding hides what small steps gain.
                 (reached < energy || largest < Self::SMALL).then_some((next, reached))
             });
-            // NaN.
+            // No step lowers the energy: it is NaN.
             let Some(found) = found else { break };
             (angles, energy) = found;
         }

@@ -31,7 +31,7 @@ pub struct Fabric {
     /// texture coordinate of the OBJ file grows. Default [1, 0, 0].
     #[serde(default = "first_axis", with = "WarpChoice")]
     pub warp: Warp,
-    /// Where the membrane takes its strain: `nodal` (the default), which lets stiff cloth fold on any mesh, or
+    /// How the membrane measures strain: `nodal` (the default), which lets stiff cloth fold on any mesh, or
     /// `per-triangle`.
     #[serde(default)]
     pub strain: Strain,
@@ -81,13 +81,13 @@ fn first_axis() -> Warp {
     Warp::Direction([1.0, 0.0, 0.0])
 }
 
-/// Where a membrane of triangles takes its strain.
+/// The strain that a membrane of triangles responds to.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Strain {
-    /// The mean over the triangles around each vertex, beside a part of the stiffness that each triangle has on its
-    /// own. Linear triangles alone lock: on an irregular mesh a stiff cloth cannot fold. Fabrics so soft, or meshes so
-    /// fine, that triangles do not lock have plain triangles. Springs and elements of your own have no mean.
+    /// The mean over the triangles around each vertex. A part of the stiffness stays with each triangle. Linear
+    /// triangles alone lock: on an irregular mesh a stiff cloth cannot fold. Fabrics so soft, or meshes so fine, that
+    /// triangles do not lock have plain triangles. Springs and elements of your own have no mean.
     #[default]
     Nodal,
     /// Each triangle has its own.

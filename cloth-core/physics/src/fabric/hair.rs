@@ -149,7 +149,7 @@ pub fn hair_terms(hair: &Hair, surroundings: &Surroundings, part: SystemPart) ->
 /// Returns the bending and twist of strands with a natural curl.
 fn curled(hair: &Hair, curl: &Curl) -> Result<CurledStrands, FabricError> {
     let length = hair.length / hair.segments as f64;
-    // Beyond a quarter of a turn between two segments, twist is not told from the other way round.
+    // If two segments differ by more than a quarter of a turn, the sense of twist is ambiguous.
     let turn = length * curl.curvature.hypot(curl.torsion);
     if turn > FRAC_PI_2 {
         let least = (hair.length * curl.curvature.hypot(curl.torsion) / FRAC_PI_2).ceil();

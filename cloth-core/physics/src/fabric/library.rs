@@ -67,7 +67,7 @@ const REPLACED: [(&str, &str); 9] = [
     ),
 ))]
 pub struct UnknownFabric {
-    /// The name.
+    /// The unknown name.
     pub name: String,
     /// The most similar fabric, for a name of an earlier version; `None` for others.
     pub replacement: Option<&'static str>,

@@ -6,7 +6,7 @@ use energy_solve::index;
 #[derive(Clone, Debug)]
 pub(super) struct Lists<T> {
     items: Vec<T>,
-    /// Where each list begins, and where the last one ends.
+    /// Index of the first item of each list, then the number of items.
     bounds: Vec<u32>,
 }
 

@@ -158,8 +158,8 @@ impl<T: Precision> Right<T> {
     }
 }
 
-/// The left factors of a row of blocks, each component three times. In a copy of its own, the compiler keeps them in
-/// registers: it cannot tell that the blocks are apart from what they come from.
+/// The left factors of a row of blocks, each component three times. Because they are copied, the compiler keeps them in
+/// registers: it cannot tell that the blocks do not alias their sources.
 struct Left<T>([([T; 8], T); 3]);
 
 impl<T: Precision> Left<T> {

@@ -64,7 +64,7 @@ impl Coordinate for f32 {
 
 /// A box, or one that moves on a straight line.
 pub trait Volume: Copy + std::fmt::Debug + PartialEq {
-    /// The coordinates.
+    /// The number type of the coordinates.
     type Number: Coordinate;
 
     /// The number of instants at which the box is known: 1, or 2 for the start and the end of a move.

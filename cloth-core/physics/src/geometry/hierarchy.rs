@@ -122,7 +122,7 @@ impl<B: Volume> Hierarchy<B> {
         self.build(bounds, from + half, to);
     }
 
-    /// Whether there are no items.
+    /// Whether the hierarchy is empty.
     pub fn is_empty(&self) -> bool {
         self.items.is_empty()
     }

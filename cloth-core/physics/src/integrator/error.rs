@@ -197,7 +197,7 @@ impl StepError {
     }
 }
 
-/// Joins alternatives to a sentence; `None` if there is none.
+/// Joins alternatives to a sentence; `None` for an empty list.
 fn joined<'a>(alternatives: impl IntoIterator<Item = &'a str>) -> Option<String> {
     let all: Vec<&str> = alternatives.into_iter().collect();
     let (last, others) = all.split_last()?;

@@ -7,10 +7,10 @@ use crate::geometry::{cross, norm, subtract};
 /// Attributes of the corners of triangles, from a file. They pass through to the outputs.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct CornerAttributes {
-    /// Texture coordinates; `None` if a corner has none.
+    /// Texture coordinates; `None` if any corner lacks them.
     pub uvs: Option<Vec<[[f64; 2]; 3]>>,
-    /// The number of each corner's normal in the file; `None` if a corner has none. Corners of a vertex with the same
-    /// number are shaded smoothly, others have an edge between them.
+    /// The number of each corner's normal in the file; `None` if any corner lacks a normal. Corners of a vertex with
+    /// the same number are shaded smoothly, others have an edge between them.
     pub normals: Option<Vec<[usize; 3]>>,
 }
 
@@ -21,7 +21,7 @@ pub struct SplitMesh {
     pub sources: Vec<usize>,
     /// The triangles, with split vertices.
     pub triangles: Vec<[usize; 3]>,
-    /// Texture coordinates of the split vertices; empty if there are none.
+    /// Texture coordinates of the split vertices; empty if the corners lack them.
     pub uvs: Vec<[f64; 2]>,
     /// Numbers from 0 of smoothly shaded corners, one per split vertex.
     pub smooth: Vec<usize>,

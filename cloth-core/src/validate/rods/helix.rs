@@ -58,8 +58,8 @@ const TENSION: f64 = 2_900.993_205_792_131;
 
 /// Returns m, t and the largest angle between tangent and axis.
 ///
-/// With the Euler angles φ and ψ of the tangent, moments about the axis and the tangent are M, so that ψ′ = M/(B (1 +
-/// cos φ)), and the energy integral gives v′² = v² (4T/B − M²/B² − 2 T v/B) for v = 1 − cos φ. So v = v₀ sech²(√(t −
+/// Let φ and ψ be the Euler angles of the tangent. The moments about the axis and the tangent are M, so that ψ′ = M/(B
+/// (1 + cos φ)). For v = 1 − cos φ, the energy integral gives v′² = v² (4T/B − M²/B² − 2 T v/B). So v = v₀ sech²(√(t −
 /// m²/4) s/L) with v₀ = 2 − m²/2t. The slack ∫ v ds and the turn M L/C + 4 arccos(m/2√t) are those of the ends.
 pub(super) fn localised(segments: usize) -> Result<[f64; 3], ValidateError> {
     let spacing = LONG / segments as f64;

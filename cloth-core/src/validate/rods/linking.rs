@@ -9,8 +9,8 @@ use crate::geometry::{cross, dot, subtract};
 /// Returns Tw + Wr of a closed rod with a linking number of 1 after each of some steps, at its furthest from 1, and how
 /// far the writhe changed.
 ///
-/// The twist is the sum of what the states of `RodTwist` have, as the angles of a closed rod cancel. Of closed
-/// polygons, Tw + Wr is a whole number (Călugăreanu 1961), or here the number that was put in.
+/// The twist is the sum of the states of `RodTwist`, as the angles of a closed rod cancel. Tw + Wr of a closed polygon
+/// is a whole number (Călugăreanu 1961), or here the number that was put in.
 pub(super) fn drift(segments: usize, steps: usize) -> Result<[f64; 2], ValidateError> {
     // Less twist than a ring buckles at, so that it does not pass through itself.
     let put_in = 1.0;

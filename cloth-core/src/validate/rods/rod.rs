@@ -343,7 +343,7 @@ pub(super) fn ring(segments: usize) -> Vec<Vector> {
     (0..segments).map(|number| (number as f64 * turn).sin_cos()).map(|(s, c)| [c, s, 0.0]).collect()
 }
 
-/// Returns the load of a weight per length, by point: half of an edge's on each of its ends. The clamp has none.
+/// Returns the load of a weight per length, by point: half of an edge's on each of its ends; 0 at the clamp.
 pub(super) fn weights(points: usize, spacing: f64, weight: Vector) -> Vec<Vector> {
     let share = |number: usize| match number {
         0 => 0.0,

@@ -41,7 +41,7 @@ pub(super) struct Material {
 pub(super) struct Grid {
     pub(super) cells: [usize; 2],
     pub(super) size: [f64; 2],
-    /// Where the points are at rest. The rest lengths are those of the triangles there.
+    /// Rest positions of the points, from which the rest lengths of the triangles follow.
     pub(super) rest: Vec<Vector>,
     triangles: Vec<[usize; 3]>,
     /// The edges in order, each with its triangles and the corners opposite to it.

@@ -2,9 +2,9 @@
 //! deformation.
 
 use super::signature::Signature;
-use super::typed::Source;
+use super::typed::{Input, Source};
 use crate::diagnostic::{Diagnostic, Diagnostics};
-use crate::syntax::{AuditRange, Declaration};
+use crate::syntax::{AuditRange, Declaration, ElementType};
 use energy_runtime::Kind;
 
 /// Reports ranges of names that are not drawn at random, and of sizes that are not positive.
@@ -19,23 +19,25 @@ pub(super) fn check(declaration: &Declaration, signature: &Signature, diagnostic
 fn check_range(range: &AuditRange, kind: Kind, signature: &Signature) -> Result<(), Box<Diagnostic>> {
     let name = &range.name;
     let fail = |message: String, help: &str| Err(Box::new(Diagnostic::new(&name.span, message).help(help.to_owned())));
-    let has_points = kind != Kind::Residual;
+    let is_point = |input: &Input| input.input_type.element == ElementType::Point;
+    let has_points = kind != Kind::Residual && signature.moving.iter().all(is_point);
     if let Some(input) = signature.names.iter().find(|input| input.name.text == name.text) {
         return match input.source {
             Source::Position | Source::Velocity if has_points => {
                 fail(format!("`{}` has no range", name.text), "state the size of all points: scale = 0.1..1")
             }
-            Source::Rest if has_rest_points(signature) => {
+            Source::Rest if rest_points(signature).is_some() => {
                 fail(format!("`{}` has no range", name.text), "state the size of the rest shape: scale = 0.1..1")
             }
             _ => Ok(()),
         };
     }
     match name.text.as_str() {
-        "scale" | "strain" if !has_points => {
-            fail(format!("a residual has no {}", name.text), "state the range of an unknown or a parameter by its name")
-        }
-        "strain" if !has_rest_points(signature) || signature.rest.len() != signature.moving.len() => fail(
+        "scale" | "strain" if !has_points => fail(
+            format!("only an element whose unknowns are points has a {}", name.text),
+            "state the range of an unknown or a parameter by its name",
+        ),
+        "strain" if rest_points(signature) != Some(signature.moving.len()) => fail(
             "strain needs a rest shape with one point for each point".into(),
             "declare the rest shape as in `rest u0, u1, u2: Vec2`, or state a scale",
         ),
@@ -52,8 +54,10 @@ fn check_range(range: &AuditRange, kind: Kind, signature: &Signature) -> Result<
     }
 }
 
-/// Whether the rest shape consists of points in the plane or in space.
-fn has_rest_points(signature: &Signature) -> bool {
-    let sizes: Vec<usize> = signature.rest.iter().map(|input| input.input_type.size()).collect();
-    sizes.first().is_some_and(|&first| (2..=3).contains(&first) && sizes.iter().all(|&size| size == first))
+/// Returns the number of points in the plane or in space that the rest shape consists of; `None` if it has other inputs.
+fn rest_points(signature: &Signature) -> Option<usize> {
+    let dimension = |input: &Input| input.input_type.element.size();
+    let first = signature.rest.first().map(dimension).filter(|size| (2..=3).contains(size))?;
+    let are_points = signature.rest.iter().all(|input| dimension(input) == first);
+    are_points.then(|| signature.rest.iter().map(|input| input.input_type.length.unwrap_or(1)).sum())
 }

@@ -2,6 +2,7 @@
 //! needs.
 
 mod array;
+mod conditional;
 mod constant;
 mod domain;
 mod equality;

@@ -8,7 +8,7 @@ use super::signature::{InputName, Signature};
 use super::typed::{Binding, Source, Typed, TypedKind};
 use crate::diagnostic::{Diagnostic, Diagnostics, nearest};
 use crate::functions::Shape;
-use crate::syntax::{Assignment, Body, Declaration, Expression, Name, Next};
+use crate::syntax::{Assignment, Body, Declaration, Expression, Next};
 
 impl<'a> Checker<'a> {
     /// Returns the new values of the state, row by row; `None` after an error.
@@ -55,18 +55,20 @@ impl<'a> Checker<'a> {
         for (names, value) in std::mem::take(&mut self.initial) {
             for name in names {
                 let checked = self.expression(value);
-                let fits = checked.and_then(|checked| self.fitting(name, value, checked, &states));
-                let Some((_, found)) = fits else {
+                let state = states.iter().find(|state| state.canonical == name.canonical());
+                let fits = checked.zip(state).and_then(|(checked, state)| self.fitting(state, value, checked));
+                let Some(found) = fits else {
                     is_sound = false;
                     continue;
                 };
-                if reads(&self.bindings, &found, &[Source::Position, Source::Velocity], &mut BTreeSet::new()) {
+                let moving = [Source::Position, Source::Velocity];
+                if found.iter().any(|entry| reads(&self.bindings, entry, &moving, &mut BTreeSet::new())) {
                     let message = format!("the value of `{}` at rest depends on what moves", name.text);
                     let help = "it is computed once, from the rest shape and parameters";
                     self.diagnostics.push(Diagnostic::new(&value.span, message).help(help));
                     is_sound = false;
                 }
-                entries.extend(found.into_entries());
+                entries.extend(found);
             }
         }
         self.in_rest = was;
@@ -90,8 +92,7 @@ impl<'a> Checker<'a> {
         let new = match (entry, range) {
             (None, _) => {
                 let checked = self.expression(value)?;
-                let (_, checked) = self.fitting(name, value, checked, states)?;
-                checked.into_entries().into_iter().enumerate().collect()
+                self.fitting(states[number], value, checked)?.into_iter().enumerate().collect()
             }
             (Some(entry), None) => vec![self.new_entry(entry, value, states[number])?],
             (Some(entry), Some((index, first, end))) => {
@@ -135,16 +136,8 @@ impl<'a> Checker<'a> {
         Some((number, checked))
     }
 
-    /// Returns the number of a state and its value, if that has the state's shape.
-    fn fitting(
-        &mut self,
-        name: &Name,
-        value: &Expression,
-        checked: Typed,
-        states: &[&InputName],
-    ) -> Option<(usize, Typed)> {
-        let number = states.iter().position(|state| state.canonical == name.canonical())?;
-        let state = states[number];
+    /// Returns the entries of a state's value, if it has the state's shape.
+    fn fitting(&mut self, state: &InputName, value: &Expression, checked: Typed) -> Option<Vec<Typed>> {
         let wanted =
             state.length.map_or(state.shape, |length| Shape::Array(u16::try_from(length).expect("arrays are short")));
         let entries = match &checked.kind {
@@ -154,11 +147,11 @@ impl<'a> Checker<'a> {
         let wrong = entries.iter().find(|entry| entry.shape != state.shape);
         if checked.shape != wanted || wrong.is_some() {
             let found = if checked.shape == wanted { wrong.map_or(checked.shape, |w| w.shape) } else { checked.shape };
-            let message = format!("the state `{}` is {wanted}, but its value is {found}", name.text);
+            let message = format!("the state `{}` is {wanted}, but its value is {found}", state.name.text);
             self.error(&value.span, message);
             return None;
         }
-        Some((number, checked))
+        Some(checked.into_entries())
     }
 }
 

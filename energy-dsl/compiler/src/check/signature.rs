@@ -64,11 +64,10 @@ impl Signature {
 
     pub(super) fn of(declaration: &Declaration, globals: &Globals, diagnostics: &mut Diagnostics) -> Self {
         let mut signature = Self::empty();
-        let mut velocities = 0;
         let groups = |state: bool| declaration.inputs.iter().filter(move |g| (g.section == Section::State) == state);
         for group in groups(false) {
             check_group(declaration, group, diagnostics);
-            signature.add_group(declaration, group, globals, &mut velocities, diagnostics);
+            signature.add_group(declaration, group, globals, diagnostics);
         }
         if declaration.kind == Kind::Constraint {
             signature.add_implied(declaration);
@@ -76,10 +75,10 @@ impl Signature {
         let own = signature.parameters.len();
         for group in groups(true) {
             check_group(declaration, group, diagnostics);
-            signature.add_group(declaration, group, globals, &mut velocities, diagnostics);
+            signature.add_group(declaration, group, globals, diagnostics);
         }
         signature.states = signature.parameters.len() - own;
-        signature.assign_velocities(velocities, diagnostics);
+        signature.assign_velocities(diagnostics);
         signature.mark_time_step(declaration, diagnostics);
         let numbers = |list: &[Input]| list.iter().map(|i| i.input_type.size()).sum::<usize>();
         if [&signature.moving, &signature.rest, &signature.parameters]
@@ -132,20 +131,19 @@ impl Signature {
         declaration: &Declaration,
         group: &InputGroup,
         globals: &Globals,
-        velocities: &mut usize,
         diagnostics: &mut Diagnostics,
     ) {
         let input_type = self.input_type(group, &declaration.name.text, globals, diagnostics);
         // Each has at least one number, so that this error is certain.
         for name in group.names.iter().take(MOST_NUMBERS + 1 - self.names.len().min(MOST_NUMBERS)) {
-            self.add(name, group, input_type, velocities, diagnostics);
+            self.add(name, group, input_type, diagnostics);
         }
     }
 
     /// Gives each velocity to the unknown with its number, and as many components as its increment has. Velocities are
     /// numbered by increments.
-    fn assign_velocities(&mut self, velocities: usize, diagnostics: &mut Diagnostics) {
-        let owners = self.owners_of_velocities();
+    fn assign_velocities(&mut self, diagnostics: &mut Diagnostics) {
+        let (owners, velocities) = (self.owners_of_velocities(), self.count(Source::Velocity));
         for name in self.names.iter_mut().filter(|name| name.source == Source::Velocity) {
             let Range { start, end } = name.numbers;
             let given = &owners[owners.len().min(start)..owners.len().min(end)];
@@ -166,6 +164,11 @@ impl Signature {
             }
             (name.first, name.shape) = (first.increment, first.shape);
         }
+    }
+
+    /// Returns the number of inputs of a kind, entry by entry.
+    fn count(&self, source: Source) -> usize {
+        self.names.iter().rfind(|name| name.source == source).map_or(0, |name| name.numbers.end)
     }
 
     /// Lists the unknowns that velocities belong to, in declared order.
@@ -236,14 +239,7 @@ impl Signature {
         }
     }
 
-    fn add(
-        &mut self,
-        name: &Name,
-        group: &InputGroup,
-        input_type: InputType,
-        velocities: &mut usize,
-        diagnostics: &mut Diagnostics,
-    ) {
+    fn add(&mut self, name: &Name, group: &InputGroup, input_type: InputType, diagnostics: &mut Diagnostics) {
         let InputGroup { section, shared, unit, .. } = group;
         let section = *section;
         let canonical = name.canonical();
@@ -266,7 +262,6 @@ impl Signature {
         }
         let (shape, length) = (shape_of(input_type.element), input_type.length);
         let (source, first) = if is_velocity {
-            *velocities += length.unwrap_or(1);
             (Source::Velocity, 0)
         } else {
             let (source, list) = match section {
@@ -293,7 +288,7 @@ impl Signature {
             (source, first)
         };
         let is_state = section == Section::State;
-        let number = self.names.iter().rfind(|other| other.source == source).map_or(0, |other| other.numbers.end);
+        let number = self.count(source);
         let numbers = number..number + length.unwrap_or(1);
         self.names.push(InputName { name: name.clone(), canonical, source, first, shape, length, numbers, is_state });
     }

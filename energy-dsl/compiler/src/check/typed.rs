@@ -99,8 +99,8 @@ impl Program {
         self.moving.len()
     }
 
-    /// Returns whether some moving inputs are not points in space that each element has of its own; false for a
-    /// residual. See [`energy_runtime::Declaration::is_mixed`].
+    /// Returns whether some moving inputs are shared or are not points in space; false for a residual. See
+    /// [`energy_runtime::Declaration::is_mixed`].
     #[must_use]
     pub fn is_mixed(&self) -> bool {
         let is_own_point = |input: &Input| input.input_type.element == ElementType::Point && !input.shared;
@@ -223,7 +223,7 @@ pub struct Typed {
 }
 
 impl Typed {
-    /// Returns the parts of the expression. A binding has none here.
+    /// Returns the parts of the expression; empty for a binding.
     pub(crate) fn parts(&self) -> Vec<&Self> {
         match &self.kind {
             TypedKind::Call(_, list) | TypedKind::Array(list) => list.iter().collect(),

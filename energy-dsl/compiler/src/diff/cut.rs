@@ -14,8 +14,8 @@ use super::outer_products::{AsTheyCome, Summation};
 use super::{differentiable, is_computed_otherwise, moving_operands};
 use crate::graph::{Graph, NodeId, Op, count, ordinary};
 
-/// The fewest nodes of a cut above which other cuts are looked for.
-const NESTED: usize = 3;
+/// The most nodes of a narrow cut.
+const NARROW: usize = 3;
 
 /// Derivatives gathered at a cut.
 #[derive(Clone)]
@@ -87,7 +87,19 @@ pub(super) fn derivatives(
             }
         }
     }
-    Some(Gathered { gradient, hessian: sums.entries(g), safe })
+    let weighted = |node: &NodeId| Some((weights[node], tangents.get(node)?));
+    let terms: Vec<(NodeId, &Sparse)> = cut.iter().filter_map(weighted).collect();
+    let is_tried = known.factored.is_some() && cut.len() <= NARROW;
+    let by_tangents = is_tried.then(|| sums.combine(g, &terms));
+    let mut found = Gathered { gradient, hessian: sums.entries(g), safe };
+    if let Some(by_tangents) = by_tangents {
+        // The gradient by the tangents of the outer products.
+        let other = Gathered { gradient: forward::dense(g, &by_tangents, coordinates.len()), ..found.clone() };
+        if other.cost(g) < found.cost(g) {
+            found = other;
+        }
+    }
+    Some(found)
 }
 
 /// Returns ∇U through the nodes of a cut of what first derivatives pass through, and whether it is right everywhere;
@@ -130,8 +142,9 @@ fn by_cut(g: &mut Graph, output: NodeId, cut: &[NodeId], known: &mut ByCut) -> G
             Gathered { gradient, hessian: forward::second_derivatives(g, output, &coordinates), safe: true }
         }
     };
-    let mut waists = if cut.len() < NESTED { Vec::new() } else { waists(g, output, &coordinates, Order::Second) };
-    if known.factored.is_some() && cut.len() >= NESTED {
+    let is_nested = cut.len() >= NARROW || known.factored.is_some();
+    let mut waists = if is_nested { waists(g, output, &coordinates, Order::Second) } else { Vec::new() };
+    if known.factored.is_some() && cut.len() >= NARROW {
         waists.extend(LinearPart::new(g, output, &coordinates, Order::Second).narrowest());
     }
     let mut least = best.cost(g);
@@ -230,7 +243,9 @@ const MOST_PRODUCTS: usize = 1_000_000;
 /// closer to the coordinates, and linear functions of the coordinates. Of many, it returns those of few nodes and the
 /// one that is closest to the coordinates.
 pub(super) fn waists(g: &Graph, output: NodeId, coordinates: &Coordinates, order: Order) -> Vec<Vec<NodeId>> {
-    let widest = (MOST_PRODUCTS / coordinates.len().pow(2).max(1)).min(coordinates.len().saturating_sub(1));
+    // A function of one number may be one of another number.
+    let narrower = coordinates.len().saturating_sub(1).max(1);
+    let widest = narrower.min(MOST_PRODUCTS / coordinates.len().pow(2).max(1));
     let mut fronts = Fronts::new(g, output, coordinates, order);
     let mut waists: Vec<Vec<NodeId>> = Vec::new();
     while fronts.advance() {
@@ -257,6 +272,7 @@ pub(super) fn primitives(g: &Graph, output: NodeId, coordinates: &Coordinates) -
     let mut cut = Vec::new();
     for &node in &nodes {
         let (is_primitive, operands): (_, Vec<NodeId>) = match g.rule(node) {
+            _ if let Some(operand) = g.collapsed_to(node) => (false, vec![operand]),
             Some(rule) if g.is_spelled_out(rule) => (false, vec![rule.value]),
             Some(rule) if rule.second.is_some() => (true, rule.arguments.clone()),
             Some(_) => return None,
@@ -273,6 +289,7 @@ pub(super) fn primitives(g: &Graph, output: NodeId, coordinates: &Coordinates) -
     // A path around the primitives ends in a node above them that also reads a node below.
     let bypassed = nodes.iter().filter(|&&node| above.contains(&node) && !cut.contains(&node)).any(|&node| {
         let operands: Vec<NodeId> = match g.rule(node) {
+            _ if let Some(operand) = g.collapsed_to(node) => vec![operand],
             Some(rule) if g.is_spelled_out(rule) => vec![rule.value],
             Some(rule) => rule.arguments.clone(),
             None => match g.op(node) {

@@ -88,17 +88,17 @@ pub fn first_derivatives(
     order: Order,
 ) -> Vec<Vec<NodeId>> {
     let tangents = tangents(g, outputs, coordinates, order);
-    let zero = g.constant(0.0);
-    outputs
-        .iter()
-        .map(|output| {
-            let mut dense = vec![zero; coordinates.len()];
-            for &(c, part) in tangents.get(output).into_iter().flatten() {
-                dense[c] = part;
-            }
-            dense
-        })
-        .collect()
+    let none = Sparse::new();
+    outputs.iter().map(|output| dense(g, tangents.get(output).unwrap_or(&none), coordinates.len())).collect()
+}
+
+/// Returns dual parts with zeros in between.
+pub(super) fn dense(g: &mut Graph, parts: &Sparse, n: usize) -> Vec<NodeId> {
+    let mut dense = vec![g.constant(0.0); n];
+    for &(c, part) in parts {
+        dense[c] = part;
+    }
+    dense
 }
 
 /// Returns the second dual parts: entry (i, j), i ≤ j, at index i·n + j.

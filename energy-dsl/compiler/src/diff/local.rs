@@ -1,5 +1,5 @@
 use super::is_by_value;
-use crate::graph::{ComputedAs, Graph, NodeId, Op, Product, symmetric_index};
+use crate::graph::{ComputedAs, Graph, NodeId, OfOneNumber, Op, Product, symmetric_index};
 
 /// The orders of derivatives to take.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -43,6 +43,9 @@ pub(super) fn local(g: &mut Graph, node: NodeId, order: Order) -> Local {
     let one = g.constant(1.0);
     let zero = g.constant(0.0);
     let two = g.constant(2.0);
+    if let Some(OfOneNumber { operand, slope, curvature }) = g.collapsed(node) {
+        return Local { operands: vec![operand], first: vec![slope], second: vec![(0, 0, vec![curvature])] };
+    }
     match g.op(node) {
         Op::Rule(_) => of_rule(g, node, order),
         Op::Neg(a) => {
@@ -63,8 +66,8 @@ pub(super) fn local(g: &mut Graph, node: NodeId, order: Order) -> Local {
         Op::Div(a, b) => of_quotient(g, node, a, b),
         Op::Sqrt(a) => {
             // p = 1/(2√a); p′ = −2 p³.
-            let half = g.constant(0.5);
-            let slope = g.div(half, node);
+            let (half, reciprocal) = (g.constant(0.5), g.div(one, node));
+            let slope = g.mul(half, reciprocal);
             let square = g.mul(slope, slope);
             let cube = g.mul(square, slope);
             let curvature = g.mul(two, cube);
@@ -165,8 +168,7 @@ fn choose(g: &mut Graph, mask: NodeId, a: NodeId, b: NodeId) -> Local {
 }
 
 fn of_quotient(g: &mut Graph, node: NodeId, a: NodeId, b: NodeId) -> Local {
-    let one = g.constant(1.0);
-    let reciprocal = g.div(one, b);
+    let reciprocal = reciprocal(g, b);
     let slope = g.mul(node, reciprocal);
     let by_b = g.neg(slope);
     let square = g.mul(reciprocal, reciprocal);
@@ -175,6 +177,16 @@ fn of_quotient(g: &mut Graph, node: NodeId, a: NodeId, b: NodeId) -> Local {
     let curvature = g.mul(slope, reciprocal);
     let curvature = g.mul(two, curvature);
     Local::new(vec![a, b], vec![reciprocal, by_b], vec![(0, 1, mixed), (1, 1, curvature)])
+}
+
+/// Creates 1/b. That of a length is known.
+fn reciprocal(g: &mut Graph, b: NodeId) -> NodeId {
+    let (one, cautious) = (g.constant(1.0), g.cautious());
+    let reciprocal = g.div(one, b);
+    match g.reciprocal_of_length(b) {
+        Some(known) => g.select(cautious, reciprocal, known),
+        None => reciprocal,
+    }
 }
 
 fn of_atan2(g: &mut Graph, y: NodeId, x: NodeId) -> Local {

@@ -56,6 +56,9 @@ fn moving_operands(graph: &Graph, node: NodeId, order: Order) -> Vec<NodeId> {
             _ => vec![defined],
         };
     }
+    if let Some(operand) = graph.collapsed_to(node) {
+        return vec![operand];
+    }
     match graph.rule(node) {
         Some(rule) if is_by_value(graph, rule, order) => vec![rule.value],
         Some(rule) => rule.arguments.clone(),

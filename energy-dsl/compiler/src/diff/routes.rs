@@ -9,7 +9,7 @@ use super::linear_part::LinearPart;
 use super::local::Order;
 use super::outer_products::{AsTheyCome, Summation};
 use super::{adjoint, cut, differentiable, forward, is_computed_otherwise};
-use crate::graph::{Graph, NodeId, count, ordinary, symmetric_index};
+use crate::graph::{DerivativeForms, Graph, NodeId, count, ordinary, symmetric_index};
 use energy_runtime::OperationCount;
 
 /// U, ∇U and the upper triangle of ∇²U in reduced coordinates.
@@ -32,8 +32,8 @@ pub struct Route {
     pub gathered_at: Option<usize>,
     /// Whether common factors are taken out of sums of products.
     pub factored: bool,
-    /// Whether inverses of matrices are differentiated as if their entries were spelled out.
-    pub spelled_out: bool,
+    /// The forms in which rules are differentiated.
+    pub forms: DerivativeForms,
     /// Operations, including those of the value.
     pub count: OperationCount,
     /// Cost according to [`OperationCount::cost`].
@@ -54,7 +54,7 @@ struct Alternative {
     name: &'static str,
     gathered_at: Option<usize>,
     factored: bool,
-    spelled_out: bool,
+    forms: DerivativeForms,
     /// Its derivatives.
     nodes: Vec<NodeId>,
     /// Whether it is right everywhere, not only on the ordinary path.
@@ -63,7 +63,14 @@ struct Alternative {
 
 impl Alternative {
     fn new(g: &Graph, name: &'static str, nodes: Vec<NodeId>, safe: bool) -> Self {
-        Self { name, gathered_at: None, factored: false, spelled_out: g.spells_out(), nodes, safe }
+        Self { name, gathered_at: None, factored: false, forms: g.derivative_forms(), nodes, safe }
+    }
+
+    /// Takes the derivatives of another route under a mask.
+    fn unless(&mut self, g: &mut Graph, mask: NodeId, other: &Self) {
+        for (node, &instead) in self.nodes.iter_mut().zip(&other.nodes) {
+            *node = g.select(mask, instead, *node);
+        }
     }
 }
 
@@ -84,8 +91,8 @@ fn cheapest(
             None if !alternative.safe => continue,
             None => count(g, &nodes),
         };
-        let &Alternative { name, gathered_at, factored, spelled_out, .. } = alternative;
-        order.push((number, Route { name, gathered_at, factored, spelled_out, count, cost: count.cost() }));
+        let &Alternative { name, gathered_at, factored, forms, .. } = alternative;
+        order.push((number, Route { name, gathered_at, factored, forms, count, cost: count.cost() }));
     }
     order.sort_by_key(|(number, route)| (route.cost, *number));
     let best = &alternatives[order.first()?.0];
@@ -118,19 +125,28 @@ pub fn second_order(
     coordinates: &Coordinates,
 ) -> (SecondOrder, Routes) {
     let before = g.clone();
-    let is_rational = has_rational(g, &[value]);
-    g.spell_out(is_rational);
+    let moving = differentiable(g, &[value], Order::Second);
+    let has_rational = moving.iter().any(|&node| is_rational(g, node));
+    let first = DerivativeForms { spelled_out: has_rational, collapsed: false };
+    g.differentiate_by(first);
     let alternatives = second_derivatives(g, value, coordinates);
     let (mut nodes, mut routes) = choose(g, routine, &[value], &alternatives);
-    g.spell_out(false);
-    let spellings = if is_rational { &[false, true][..] } else { &[false] };
-    for &spelled_out in spellings {
+    g.differentiate_by(DerivativeForms::default());
+    let rationals = if has_rational { &[false, true][..] } else { &[false] };
+    let collapsed = if moving.iter().any(|&node| g.collapses(node)) { &[false, true][..] } else { &[false] };
+    let forms = collapsed
+        .iter()
+        .flat_map(|&collapsed| rationals.iter().map(move |&spelled_out| DerivativeForms { spelled_out, collapsed }));
+    for forms in forms {
         let mut other = before.clone();
         let attempt = || {
-            other.spell_out(spelled_out);
+            other.differentiate_by(forms);
             let mut alternatives = factored_derivatives(&mut other, value, coordinates);
-            if is_rational && !spelled_out {
+            if forms != first {
                 alternatives.extend(second_derivatives(&mut other, value, coordinates));
+            }
+            if forms.collapsed {
+                by_vectors_where_lengths_vanish(&mut other, value, coordinates, &mut alternatives);
             }
             cheapest(&mut other, routine, &[value], &alternatives)
         };
@@ -138,7 +154,7 @@ pub fn second_order(
         let is_taken = 20 * found.list[0].cost < 19 * routes.list[0].cost;
         let taken = if is_taken { found.list[0] } else { routes.list[0] };
         if is_taken {
-            other.spell_out(false);
+            other.differentiate_by(DerivativeForms::default());
             (*g, nodes) = (other, others);
             g.budget().spend(steps, bytes);
         }
@@ -149,10 +165,33 @@ pub fn second_order(
     (SecondOrder { value, gradient: nodes, hessian }, routes)
 }
 
-/// Returns whether the outputs depend on rational primitives.
-fn has_rational(g: &Graph, outputs: &[NodeId]) -> bool {
-    let is_rational = |&node: &NodeId| g.rule(node).is_some_and(|rule| rule.primitive.is_rational());
-    differentiable(g, outputs, Order::Second).iter().any(is_rational)
+/// Takes derivatives by vectors where the length of one vanishes.
+fn by_vectors_where_lengths_vanish(
+    g: &mut Graph,
+    value: NodeId,
+    coordinates: &Coordinates,
+    collapsed: &mut Vec<Alternative>,
+) {
+    g.differentiate_by(DerivativeForms { collapsed: false, ..g.derivative_forms() });
+    let by_vectors = safe_everywhere(g, value, coordinates);
+    let moving = differentiable(g, &[value], Order::Second);
+    let vanishes = g.any_vanishes(moving);
+    collapsed.iter_mut().for_each(|route| route.unless(g, vanishes, &by_vectors));
+    collapsed.push(by_vectors);
+}
+
+const SPELLED_OUT: DerivativeForms = DerivativeForms { spelled_out: true, collapsed: false };
+
+fn is_rational(g: &Graph, node: NodeId) -> bool {
+    g.rule(node).is_some_and(|rule| rule.primitive.is_rational())
+}
+
+/// Returns a route that is right on the general path, too.
+fn safe_everywhere(g: &mut Graph, value: NodeId, coordinates: &Coordinates) -> Alternative {
+    let gradient = forward::first_derivatives(g, &[value], coordinates, Order::First).remove(0);
+    let entries = forward::second_derivatives(g, value, coordinates);
+    let nodes = dense(g, coordinates.len(), &gradient, entries);
+    Alternative::new(g, "forward over forward", nodes, true)
 }
 
 /// Returns the routes with the derivatives of rational primitives, and those through their values.
@@ -161,12 +200,11 @@ fn in_both_spellings(
     outputs: &[NodeId],
     routes: impl Fn(&mut Graph) -> Vec<Alternative>,
 ) -> Vec<Alternative> {
-    let is_rational = has_rational(g, outputs);
     let mut alternatives = routes(g);
-    if is_rational {
-        g.spell_out(true);
+    if differentiable(g, outputs, Order::Second).into_iter().any(|node| is_rational(g, node)) {
+        g.differentiate_by(SPELLED_OUT);
         alternatives.extend(routes(g));
-        g.spell_out(false);
+        g.differentiate_by(DerivativeForms::default());
     }
     alternatives
 }
@@ -224,10 +262,7 @@ fn factored_derivatives(g: &mut Graph, value: NodeId, coordinates: &Coordinates)
     let plain = || AsTheyCome::new(n);
     alternatives.extend(gathered(g, value, coordinates, apart.as_ref(), (&narrowest, &mut by_cut), plain));
     if !alternatives.is_empty() && !alternatives.iter().any(|route| route.safe) {
-        let gradient = forward::first_derivatives(g, &[value], coordinates, Order::First).remove(0);
-        let entries = forward::second_derivatives(g, value, coordinates);
-        let nodes = dense(g, n, &gradient, entries);
-        alternatives.push(Alternative::new(g, "forward over forward", nodes, true));
+        alternatives.push(safe_everywhere(g, value, coordinates));
     }
     alternatives
 }

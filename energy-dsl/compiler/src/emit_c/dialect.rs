@@ -43,7 +43,8 @@ impl Precision {
         }
     }
 
-    /// Returns a number as a literal; `None` for those that have none that every compiler reads.
+    /// Returns a number as a literal that every compiler reads; `None` if no such literal exists: for subnormal
+    /// numbers, infinities and NaN.
     pub(super) fn literal(self, value: f64) -> Option<String> {
         let single = value as f32;
         match self {

@@ -1,4 +1,4 @@
-//! What hosts need of an element: its description, loops over elements, kernels of CUDA.
+//! Code for hosts: the description of an element, loops over elements, CUDA kernels.
 
 use std::fmt::Write as _;
 
@@ -77,7 +77,7 @@ impl Element<'_> {
         let batch = format!("energy_{}_{batch}", self.dialect.precision.name());
         let (mut text, mut cases) = (String::new(), String::new());
         for function in self.functions() {
-            // One kernel has all vertices; loops of mixed unknowns have none.
+            // One kernel serves all vertices. Loops over mixed unknowns have no routines of single vertices.
             let is_vertex = matches!(function.kind, RoutineKind::Vertex(_));
             if is_vertex && (self.has_mixed_loops() || function.kind != RoutineKind::Vertex(0)) {
                 continue;

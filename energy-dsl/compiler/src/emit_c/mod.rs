@@ -46,7 +46,7 @@ pub enum Target {
 pub struct SourceFile {
     /// Name without a folder.
     pub name: String,
-    /// Text.
+    /// Contents of the file.
     pub text: String,
     /// Whether it is the same for all elements.
     pub is_shared: bool,
@@ -88,7 +88,7 @@ pub fn sources(
 pub enum SourceError {
     /// Two elements have one name in C.
     SameName {
-        /// The name.
+        /// The common name in C.
         name: String,
     },
 }

@@ -14,11 +14,11 @@ use energy_runtime::RoutineKind;
 /// are expanded. Where there are more, registers do not suffice, and compilers would take twice the time.
 const MERGED: usize = 600;
 
-/// What a function does.
+/// Body of a function: its statements and its fallback.
 struct Body<'a> {
     function: &'a Function,
     code: Code,
-    /// What is returned for other inputs.
+    /// Expression to return where the ordinary path does not suffice.
     otherwise: Option<String>,
     is_term: bool,
     /// Whether other inputs need all arguments.

@@ -81,8 +81,8 @@ fn vector_of_unit(g: &Graph, components: &[NodeId]) -> Option<Vec<NodeId>> {
     all.then_some(arguments)
 }
 
-/// The cosine c of the angle between a and b, with what it and 1 − c need; w = a × b. The root in γ = √P/P and the
-/// division in 1/P, P = ‖a‖²‖b‖², are independent and overlap; 1/‖a‖² = ‖b‖²/P and 1/‖b‖² = ‖a‖²/P.
+/// The cosine c of the angle between a and b, with intermediate results of c and 1 − c; w = a × b. The root in γ = √P/P
+/// and the division in 1/P, P = ‖a‖²‖b‖², are independent and overlap; 1/‖a‖² = ‖b‖²/P and 1/‖b‖² = ‖a‖²/P.
 struct Aligned {
     a: Vec<NodeId>,
     b: Vec<NodeId>,
@@ -181,11 +181,11 @@ pub(super) fn recognise_one_plus_cosine(g: &mut Graph, x: NodeId, y: NodeId) -> 
 
 /// Parts of the derivatives with respect to a, one of the two vectors.
 struct Side {
-    /// p.
+    /// The gradient p.
     gradient: [NodeId; 3],
     /// −a′.
     minus_inverse: Vec<NodeId>,
-    /// s.
+    /// The vector s of the diagonal block.
     slant: [NodeId; 3],
     /// −1/‖a‖².
     minus_per_square: NodeId,
@@ -314,6 +314,19 @@ pub(super) fn between(g: &mut Graph, a: &[NodeId], b: &[NodeId]) -> NodeId {
         .flagged(0, Flag::Degenerate, pair.degenerate)
         .flagged(1, Flag::Degenerate, w.zero);
     g.add_rule(rule, &[])
+}
+
+/// Creates asin â·b̂ = π/2 − φ, the angle between one vector and the plane across the other one. It has all its digits
+/// where the vectors are orthogonal, and is regular beside them.
+pub(super) fn elevation(g: &mut Graph, a: &[NodeId], b: &[NodeId]) -> NodeId {
+    let (angle, pair) = (between(g, a, b), pair(g, a, b));
+    let (null, minus_one) = (g.constant(0.0), g.constant(-1.0));
+    let w = direction(g, &pair.cross);
+    let sine = g.div(w.length, w.scale);
+    let raw = g.atan2(pair.dot, sine);
+    let value = g.select(pair.degenerate, null, raw);
+    let rule = Rule::smooth(Primitive::Elevation, vec![angle], value, vec![minus_one], vec![null]);
+    g.add_rule(rule.flagged(0, Flag::Degenerate, pair.degenerate), &[])
 }
 
 /// Recognises v = √(c (1 − â·b̂)) with a constant c. At v = 0, the tip of a cone, derivatives are taken as 0. With

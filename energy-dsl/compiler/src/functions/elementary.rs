@@ -224,11 +224,33 @@ fn half(g: &mut Graph, x: NodeId) -> NodeId {
 
 /// Recognises 1 − cos x.
 pub(super) fn recognise_versine(g: &mut Graph, one: NodeId, cosine: NodeId) -> Option<NodeId> {
-    let angle = match g.op(cosine) {
-        Op::Cos(angle) => angle,
-        _ => *g.rule(cosine).filter(|r| r.primitive == Primitive::DihedralCosine)?.arguments.first()?,
-    };
+    let angle = angle_of_cosine(g, cosine)?;
     g.is(one, 1.0).then(|| versine(g, angle))
+}
+
+/// Recognises 1 + cos x.
+pub(super) fn recognise_vercosine(g: &mut Graph, x: NodeId, y: NodeId) -> Option<NodeId> {
+    let cosine = if g.is(x, 1.0) { y } else { x };
+    let angle = angle_of_cosine(g, cosine).filter(|_| g.is(x, 1.0) || g.is(y, 1.0))?;
+    Some(vercosine(g, angle))
+}
+
+fn angle_of_cosine(g: &Graph, cosine: NodeId) -> Option<NodeId> {
+    match g.op(cosine) {
+        Op::Cos(angle) => Some(angle),
+        _ => g.rule(cosine).filter(|r| r.primitive == Primitive::DihedralCosine)?.arguments.first().copied(),
+    }
+}
+
+/// Creates 1 + cos x = 2 cos² x/2. The first derivative is −sin x, the second −cos x.
+fn vercosine(g: &mut Graph, x: NodeId) -> NodeId {
+    let (half, sine, cosine) = (half(g, x), g.sin(x), g.cos(x));
+    let cosine_half = g.cos(half);
+    let (square, two) = (g.mul(cosine_half, cosine_half), g.constant(2.0));
+    let value = g.mul(two, square);
+    let derivatives = [sine, cosine].map(|function| g.neg(function));
+    let [first, second] = derivatives.map(|entry| vec![entry]);
+    g.add_rule(Rule::smooth(Primitive::Vercosine, vec![x], value, first, second), &[])
 }
 
 /// Creates 1 − cos x. The first derivative is sin x, the second cos x.

@@ -40,22 +40,17 @@ fn undivided(g: &mut Graph, x: &[NodeId], y: &[NodeId]) -> NodeId {
     if g.form() == Form::Textbook || !moving || !distinct {
         return value;
     }
+    if square {
+        let (half_square, two) = (g.half_square(x), g.constant(2.0));
+        return g.mul(two, half_square);
+    }
     let (n, one) = (x.len(), g.constant(1.0));
-    let arguments: Vec<NodeId> = if square { x.to_vec() } else { [x, y].concat() };
-    let slopes = if square { x.to_vec() } else { [y, x].concat() };
-    let first: Vec<Product> = slopes.into_iter().map(|part| vec![part]).collect();
+    let arguments: Vec<NodeId> = [x, y].concat();
+    let first: Vec<Product> = [y, x].concat().into_iter().map(|part| vec![part]).collect();
     let m = arguments.len();
     let mut second = vec![Vec::new(); m * (m + 1) / 2];
-    for i in 0..n {
-        second[symmetric_index(m, i, if square { i } else { n + i })] = vec![vec![one]];
-    }
-    if !square {
-        return g.add_rule(Rule::factored(Primitive::InnerProduct, arguments, value, first, second), &[]);
-    }
-    let (half, two) = (g.constant(0.5), g.constant(2.0));
-    let value = g.mul(half, value);
-    let half_square = g.add_rule(Rule::factored(Primitive::InnerProduct, arguments, value, first, second), &[]);
-    g.mul(two, half_square)
+    (0..n).for_each(|i| second[symmetric_index(m, i, n + i)] = vec![vec![one]]);
+    g.add_rule(Rule::factored(Primitive::InnerProduct, arguments, value, first, second), &[])
 }
 
 /// Returns (a·b)/(d e) for x = a/d and y = b/e, such as the entries of an inverse: one quotient has shorter derivatives

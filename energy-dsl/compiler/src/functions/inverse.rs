@@ -6,9 +6,9 @@
 
 use crate::graph::{Contraction, Form, Graph, NodeId, Op, Origin, Primitive, Product, Rule, upper};
 
-/// Returns whether the entries of F⁻¹ are primitives. Those of other matrices than 3×3 have short derivatives as they
-/// are. The entries of F must be linear functions: the derivatives of B have its errors, which follow from those of F,
-/// and of FᵀF or a rotation the inverse may be far better conditioned than it seems from the entries.
+/// Returns whether the entries of F⁻¹ are primitives. Only 3×3 matrices need them: for other sizes, the derivatives are
+/// short anyway. The entries of F must be linear functions: the derivatives of B have its errors, which follow from
+/// those of F. The inverse of FᵀF or of a rotation may be far better conditioned than the entries suggest.
 pub(super) fn has_primitives(g: &Graph, f: &[NodeId]) -> bool {
     g.form() == Form::Robust && f.len() == 9 && f.iter().any(|&entry| g.varies(entry)) && g.are_linear(f)
 }

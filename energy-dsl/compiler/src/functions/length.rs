@@ -5,7 +5,7 @@
 
 use super::inner_product::inner_product;
 use super::{Function, Lowered, Shape, Units, parallelogram};
-use crate::graph::{Form, Graph, NodeId, Origin, Primitive, Rule, upper};
+use crate::graph::{BySquare, Form, Graph, NodeId, Origin, Primitive, Rule, upper};
 use energy_runtime::Flag;
 
 pub(super) const FUNCTIONS: &[Function] = &[
@@ -148,9 +148,12 @@ fn length(g: &mut Graph, d: &[NodeId]) -> NodeId {
             (d.to_vec(), (first, second))
         }
     };
-    let rule = Rule::factored(Primitive::Norm, arguments, value, first, second);
-    let rule = Rule { vector: Some(d.to_vec()), ..rule.flagged(1, Flag::Degenerate, at.zero) };
-    g.add_rule(rule, d)
+    let rule = Rule::factored(Primitive::Norm, arguments, value, first, second).flagged(1, Flag::Degenerate, at.zero);
+    // 1/r and −1/r³.
+    let (square, minus) = (g.half_square(d), g.neg(curvature));
+    let by_square =
+        BySquare { square, zero: at.zero, slope: vec![curvature], curvature: vec![minus, curvature, curvature] };
+    g.add_rule(Rule { vector: Some(d.to_vec()), by_square: Some(by_square), ..rule }, d)
 }
 
 fn norm_squared(g: &mut Graph, args: &[Lowered]) -> Lowered {
@@ -211,7 +214,7 @@ pub(super) fn recognise_norm_power(g: &mut Graph, base: NodeId, exponent: NodeId
         return None;
     }
     if let Some(power) = g.as_constant(exponent).filter(|power| *power > 0.0 && power % 2.0 == 0.0) {
-        let (square, half) = (g.sum_of_squares(&d), g.constant(power / 2.0));
+        let (square, half) = (inner_product(g, &d, &d), g.constant(power / 2.0));
         return Some(g.plain_pow(square, half));
     }
     let at = direction(g, &d);
@@ -239,9 +242,16 @@ pub(super) fn recognise_norm_power(g: &mut Graph, base: NodeId, exponent: NodeId
         .collect();
     let (at_most_one, below_two) = (g.less_or_equal(exponent, one), g.less(exponent, two));
     let (cone, singular) = (g.and(at.zero, at_most_one), g.and(at.zero, below_two));
+    // α r^(α−2) and α (α − 2) r^(α−4).
+    let by_square = BySquare {
+        square: g.half_square(&d),
+        zero: at.zero,
+        slope: vec![ratio],
+        curvature: vec![ratio, less_two, reciprocal, reciprocal],
+    };
     let rule = Rule::factored(Primitive::NormPower, d, value, first, second);
     let rule = rule.flagged(1, Flag::Degenerate, cone).flagged(2, Flag::Degenerate, singular);
-    Some(g.add_rule(rule, &[exponent]))
+    Some(g.add_rule(Rule { by_square: Some(by_square), ..rule }, &[exponent]))
 }
 
 /// Recognises C = ‖d‖ − L, where L does not move. C = (r − L) + ρ, where r is the rounded length and ρ = (d·d − r²)/2r
@@ -292,9 +302,15 @@ pub(super) fn recognise_elongation(g: &mut Graph, norm: NodeId, rest_length: Nod
         .collect();
     let not_slack = g.not(slack);
     let collapsed = g.and(at.zero, not_slack);
-    let half_square = Rule::factored(Primitive::HalfElongationSquared, d.clone(), half_value, half_first, half_second)
+    let by_square = BySquare {
+        square: g.half_square(&d),
+        zero: at.zero,
+        slope: vec![reciprocal, elongation],
+        curvature: vec![reciprocal, length, per_square, scale, scale],
+    };
+    let rule = Rule::factored(Primitive::HalfElongationSquared, d.clone(), half_value, half_first, half_second)
         .flagged(1, Flag::Degenerate, collapsed);
-    let half_square = g.add_rule(half_square, &[rest_length]);
+    let half_square = g.add_rule(Rule { by_square: Some(by_square), ..rule }, &[rest_length]);
 
     // Differentiated with respect to ‖d‖, so that everything that depends on both gathers there.
     let rule = Rule::smooth(Primitive::Elongation, vec![norm], value, vec![one], vec![null]);

@@ -171,6 +171,12 @@ pub const RECOGNISERS: &[Recogniser] = &[
         recognise: elementary::recognise_versine,
     },
     Recogniser {
+        spelling: "1 + cos(x)",
+        form: "2 cos(x/2)², accurate near x = π",
+        ending: Ending::Sum,
+        recognise: elementary::recognise_vercosine,
+    },
+    Recogniser {
         spelling: "exp(x) - \
         1",
         form: "`expm1(x)`",

@@ -7,7 +7,7 @@ use super::power_series::{Interval, economised, polynomial};
 use super::quaternion::is_unit;
 use crate::graph::{Form, Graph, NodeId, Origin, Primitive, Rule};
 
-/// Returns the rotation vector. q and −q rotate alike: it is that of the one with w ≥ 0.
+/// Returns the rotation vector. q and −q are the same rotation: the one with w ≥ 0 is used.
 pub(super) fn rotation_vector(g: &mut Graph, q: &Lowered) -> Lowered {
     let (w, v) = (q.parts[0], &q.parts[1..]);
     let (null, two) = (g.constant(0.0), g.constant(2.0));
@@ -21,7 +21,7 @@ pub(super) fn rotation_vector(g: &mut Graph, q: &Lowered) -> Lowered {
         let factor = g.mul(two, ratio);
         return Lowered::vector(g.scaled(factor, v));
     }
-    // Four numbers that move by themselves leave the unit sphere.
+    // Four numbers that move independently leave the unit sphere.
     let is_unit = is_unit(g, &q.parts);
     let (w, two) = if is_unit { (w, two) } else { normalised(g, &q.parts, two) };
     let is_negative = g.less(w, null);
@@ -59,7 +59,7 @@ fn normalised(g: &mut Graph, q: &[NodeId], number: NodeId) -> (NodeId, NodeId) {
     (g.mul(q[0], inverse), g.mul(number, inverse))
 }
 
-/// Below this 1 − w, the series is shorter than what it replaces, and A + 3 w A′ cancels.
+/// Below this 1 − w, the series is shorter than the expressions that it replaces, and A + 3 w A′ cancels.
 const SERIES_BELOW: f64 = 0.5;
 
 /// Creates A(w).
@@ -67,7 +67,7 @@ fn arc_over_sine(g: &mut Graph, w: NodeId) -> NodeId {
     let (one, two, three, below) = (g.constant(1.0), g.constant(2.0), g.constant(3.0), g.constant(SERIES_BELOW));
     let z = g.sub(one, w);
     let is_near = g.less(z, below);
-    // Where the series counts, the other forms are computed at a quarter turn.
+    // Where the series is used, 1 replaces z in the other forms, so that they stay finite.
     let far = g.select(is_near, one, z);
     let sum = g.sub(two, far);
     let square = g.mul(far, sum);

@@ -19,10 +19,11 @@ pub(super) const FUNCTIONS: &[Function] = &[
         name: "asin",
         usage: "asin(x)",
         docs: "The angle in [−π/2, π/2] whose sine is x. If |x| > 1, x is clamped and flagged. If |x| ≥ 1, the \
-             derivatives are taken as 0 and flagged.",
+             derivatives are taken as 0 and flagged. `asin(dot(unit(a), unit(b)))`, the angle between a vector and a \
+             plane, is compiled without the product.",
         shape: one_scalar,
         units: Units::Plain,
-        lower: |g, a| Lowered::scalar(arc(g, a[0].node(), Primitive::ArcSine)),
+        lower: |g, a| Lowered::scalar(asin(g, a[0].node())),
         accuracy: "3 / 3 / 8",
     },
     Function {
@@ -82,13 +83,23 @@ fn tan(g: &mut Graph, x: NodeId) -> NodeId {
 }
 
 fn acos(g: &mut Graph, x: NodeId) -> NodeId {
-    if g.form() == Form::Robust
-        && let Some(rule) = g.rule(x).filter(|r| r.primitive == Primitive::Cosine)
-    {
-        let vectors = rule.arguments.clone();
-        return super::angle::between(g, &vectors[..3], &vectors[3..]);
+    match vectors_of_cosine(g, x) {
+        Some(vectors) => super::angle::between(g, &vectors[..3], &vectors[3..]),
+        None => arc(g, x, Primitive::ArcCosine),
     }
-    arc(g, x, Primitive::ArcCosine)
+}
+
+fn asin(g: &mut Graph, x: NodeId) -> NodeId {
+    match vectors_of_cosine(g, x) {
+        Some(vectors) => super::angle::elevation(g, &vectors[..3], &vectors[3..]),
+        None => arc(g, x, Primitive::ArcSine),
+    }
+}
+
+/// Returns the two vectors of the cosine of an angle.
+fn vectors_of_cosine(g: &Graph, x: NodeId) -> Option<Vec<NodeId>> {
+    let rule = g.rule(x).filter(|rule| g.form() == Form::Robust && rule.primitive == Primitive::Cosine)?;
+    Some(rule.arguments.clone())
 }
 
 /// Creates asin x = atan2(x, c) or acos x = atan2(c, x) with c = √((1 − x)(1 + x)). The first derivatives are ±1/c, the

@@ -86,7 +86,7 @@ fn rows(g: &mut Graph, conjugate: &[NodeId]) -> Vec<Vec<NodeId>> {
     (0..3).map(|row| columns.iter().map(|column| column[row]).collect()).collect()
 }
 
-/// What the derivatives of a turned vector consist of.
+/// The vectors that the derivatives of a turned vector consist of.
 struct Turning {
     /// The axes of the increments, seen from where the result is: e, or the rows of R.
     axes: Vec<Vec<NodeId>>,

@@ -93,7 +93,7 @@ impl Graph {
 
     /// Returns whether to fold an operation on constants. The textbook form is also evaluated in higher precision, so
     /// it only folds exact results.
-    fn folds(&self, exact: bool) -> bool {
+    pub(super) fn folds(&self, exact: bool) -> bool {
         exact || self.form() == Form::Robust
     }
 
@@ -315,7 +315,11 @@ impl Graph {
     /// Creates |a|.
     pub fn abs(&mut self, a: NodeId) -> NodeId {
         let (a, _) = self.magnitude(a);
-        self.unary(a, f64::abs, Op::Abs)
+        match self.op(a) {
+            Op::Mul(x, y) if x == y => a,
+            Op::Sqrt(_) | Op::Exp(_) => a,
+            _ => self.unary(a, f64::abs, Op::Abs),
+        }
     }
 
     /// Creates sin a. For a dihedral angle or its half, the angle is not computed.
@@ -372,31 +376,6 @@ impl Graph {
         self.plain_pow(a, b)
     }
 
-    /// Creates a^b without recognition.
-    pub(crate) fn plain_pow(&mut self, a: NodeId, b: NodeId) -> NodeId {
-        let Some(exponent) = self.as_constant(b) else { return self.node(Op::Pow(a, b)) };
-        if let Some(x) = self.as_constant(a)
-            && self.folds(false)
-        {
-            return self.constant(x.powf(exponent));
-        }
-        let doubled = 2.0 * exponent;
-        if doubled.fract() != 0.0 || doubled.abs() > 64.0 {
-            return self.node(Op::Pow(a, b));
-        }
-        let whole = exponent.abs().floor();
-        let mut power = self.integer_power(a, whole as u32);
-        if exponent.fract() != 0.0 {
-            let root = self.sqrt(a);
-            power = self.mul(power, root);
-        }
-        if exponent < 0.0 {
-            let one = self.constant(1.0);
-            power = self.div(one, power);
-        }
-        power
-    }
-
     /// Creates an operation on nodes of this graph by its constructor, which simplifies.
     pub(crate) fn rebuilt(&mut self, op: Op) -> NodeId {
         match op {
@@ -443,18 +422,6 @@ impl Graph {
             Op::Select(mask, a, b) => self.select(mask, a, b),
             Op::Rule(_) | Op::MulSub(..) | Op::NegMulSub(..) => {
                 unreachable!("compiler bug: resolved, and not yet fused")
-            }
-        }
-    }
-
-    fn integer_power(&mut self, a: NodeId, exponent: u32) -> NodeId {
-        match exponent {
-            0 => self.constant(1.0),
-            1 => a,
-            n => {
-                let half = self.integer_power(a, n / 2);
-                let square = self.mul(half, half);
-                if n % 2 == 1 { self.mul(square, a) } else { square }
             }
         }
     }

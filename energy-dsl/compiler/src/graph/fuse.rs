@@ -26,7 +26,7 @@ impl Graph {
 
     fn with_product(&self, node: NodeId) -> Op {
         match self.op(node) {
-            op @ Op::Add(a, b) if !self.has(Op::SumError(a.min(b), a.max(b))) => {
+            op @ Op::Add(a, b) if !self.has(Op::SumError(a.min(b), a.max(b))) && !self.unfused.contains(&node) => {
                 match (self.product_of(a), self.product_of(b)) {
                     // Fuses the product with fewer uses; the other one is computed anyway.
                     (Some((x, y)), Some(_)) if self.users(a) < self.users(b) => Op::MulAdd(x, y, b),
@@ -87,6 +87,16 @@ impl Graph {
             }
             _ => None,
         }
+    }
+
+    /// Creates a + b without fusing. A sum that exists already stays as it is, because others use it.
+    pub(super) fn unfused_sum(&mut self, a: NodeId, b: NodeId) -> NodeId {
+        let before = self.len();
+        let sum = self.node(Op::Add(a.min(b), a.max(b)));
+        if self.len() > before {
+            self.unfused.insert(sum);
+        }
+        sum
     }
 
     /// Marks a node as rounded before every use.

@@ -4,12 +4,14 @@
 mod build;
 mod contraction;
 mod count;
+mod derivative_forms;
 mod fuse;
 mod interpret;
 mod mask;
 mod node;
 mod ordinary;
 mod origin;
+mod powers;
 mod recognise;
 mod rounding;
 mod rule;
@@ -20,6 +22,8 @@ mod sums;
 
 pub(crate) use contraction::Contraction;
 pub use count::{count, reachable};
+pub use derivative_forms::DerivativeForms;
+pub(crate) use derivative_forms::{BySquare, OfOneNumber};
 pub use interpret::Interpreter;
 pub(crate) use node::Spelling;
 pub use node::{Input, NodeId, Op};
@@ -71,6 +75,8 @@ pub struct Graph {
     determinants: Vec<NodeId>,
     /// Nodes that are rounded before every use; see `fuse.rs`.
     rounded: BTreeSet<NodeId>,
+    /// Sums whose terms do not fuse with them.
+    unfused: BTreeSet<NodeId>,
     /// Differences of products that absorb a weight; see `sums.rs`.
     weighable: BTreeMap<NodeId, [Product; 2]>,
     /// Whether powers of two move outwards, to meet and cancel.
@@ -79,8 +85,12 @@ pub struct Graph {
     compensated: bool,
     /// Parameters that the formula differentiates by.
     varied: BTreeSet<Input>,
-    /// Whether rational primitives are differentiated through their values.
-    spelled_out: bool,
+    /// Products and quotients that are powers: bases and exponents.
+    powers: FxHashMap<NodeId, (NodeId, f64)>,
+    /// Powers by base and positive whole exponent.
+    whole_powers: FxHashMap<(NodeId, u32), NodeId>,
+    /// The forms in which rules are differentiated.
+    derivative_forms: DerivativeForms,
     /// Pays for nodes and for passes over them.
     budget: Budget,
 }
@@ -114,11 +124,14 @@ impl Graph {
             contractions: Vec::new(),
             determinants: Vec::new(),
             rounded: BTreeSet::new(),
+            unfused: BTreeSet::new(),
             weighable: BTreeMap::new(),
             outward: false,
             compensated: true,
             varied: BTreeSet::new(),
-            spelled_out: false,
+            powers: FxHashMap::default(),
+            whole_powers: FxHashMap::default(),
+            derivative_forms: DerivativeForms::default(),
             budget: Budget::new(Limits::NONE),
         }
     }
@@ -147,26 +160,6 @@ impl Graph {
     /// Sets whether powers of two move out of products and sums.
     pub fn move_outward(&mut self, outward: bool) {
         self.outward = outward;
-    }
-
-    /// Sets whether rational primitives are differentiated through their values, as if they were spelled out.
-    pub(crate) fn spell_out(&mut self, spelled_out: bool) {
-        self.spelled_out = spelled_out;
-    }
-
-    /// Returns whether rational primitives are spelled out.
-    pub(crate) fn spells_out(&self) -> bool {
-        self.spelled_out
-    }
-
-    /// Returns whether a rule is a rational primitive that is spelled out.
-    pub(crate) fn is_spelled_out(&self, rule: &Rule) -> bool {
-        self.spelled_out && rule.primitive.is_rational()
-    }
-
-    /// Returns the value of a rational primitive; other nodes as they are.
-    pub(crate) fn as_computed(&self, node: NodeId) -> NodeId {
-        self.rule(node).filter(|rule| rule.primitive.is_rational()).map_or(node, |rule| rule.value)
     }
 
     /// Returns the last node that was created.

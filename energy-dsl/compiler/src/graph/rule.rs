@@ -1,5 +1,5 @@
 use super::node::NodeId;
-use super::{Expansion, Graph, Op};
+use super::{BySquare, Expansion, Graph, Op};
 use energy_runtime::Flag;
 
 /// A robust primitive of the language. Each component of a vector-valued one is a primitive.
@@ -25,6 +25,8 @@ pub enum Primitive {
     OneMinusCosine,
     /// The unsigned angle between two vectors.
     Angle,
+    /// π/2 less that angle.
+    Elevation,
     /// The signed dihedral angle θ of a hinge.
     Dihedral,
     /// sin θ of a dihedral angle.
@@ -39,6 +41,8 @@ pub enum Primitive {
     DihedralSineDifference,
     /// 1 − cos x.
     Versine,
+    /// 1 + cos x.
+    Vercosine,
     /// x − sin x.
     SineRemainder,
     /// A remainder of a Taylor series, xᵖ Φₖ(x): the family, k and p. (eˣ − 1 − x)/x² has k = 2 and p = 0.
@@ -152,6 +156,7 @@ impl Primitive {
             Self::Cosine => "cosine between vectors",
             Self::OneMinusCosine => "1 − cosine between vectors",
             Self::Angle => "angle between vectors",
+            Self::Elevation => "angle between a vector and a plane",
             Self::Dihedral => "dihedral angle θ",
             Self::DihedralSine => "sin θ of a dihedral angle",
             Self::DihedralCosine => "cos θ of a dihedral angle",
@@ -159,6 +164,7 @@ impl Primitive {
             Self::DihedralCosineHalf => "cos θ/2 of a dihedral angle",
             Self::DihedralSineDifference => "sin θ/2 − sin θ₀/2 of a dihedral angle",
             Self::Versine => "1 − cos x",
+            Self::Vercosine => "1 + cos x",
             Self::SineRemainder => "x − sin x",
             Self::Remainder(..) => "remainder of a Taylor series",
             Self::ReciprocalNorm => "reciprocal norm 1/‖d‖",
@@ -235,6 +241,8 @@ pub struct Rule {
     pub half_square: Option<NodeId>,
     /// The vector of a length; `None` for other rules.
     pub vector: Option<Vec<NodeId>>,
+    /// Its derivatives by ½ d·d, if it is a function of ‖d‖; `None` for other rules.
+    pub(crate) by_square: Option<BySquare>,
     /// An expression that the user wrote inside of the rule; `None` for other rules. Its singularities count.
     pub inner: Option<NodeId>,
 }
@@ -357,6 +365,7 @@ impl Graph {
                 dihedral: None,
                 half_square: None,
                 vector: None,
+                by_square: None,
                 inner: None,
             },
             &[],
@@ -399,6 +408,7 @@ impl Rule {
             dihedral: None,
             half_square: None,
             vector: None,
+            by_square: None,
             inner: None,
         }
     }

@@ -12,15 +12,15 @@ impl Graph {
         }
     }
 
-    /// Creates Σ terms by halves: few additions wait for each other.
-    pub fn pairwise_sum(&mut self, terms: &[NodeId]) -> NodeId {
+    /// Creates Σ terms by halves: few additions wait for each other. Terms that are computed anyway do not fuse with it.
+    pub(crate) fn pairwise_sum(&mut self, terms: &[NodeId], are_computed: bool) -> NodeId {
         match terms {
             [] => self.constant(0.0),
             [term] => *term,
             _ => {
                 let (first, last) = terms.split_at(terms.len() / 2);
-                let (first, last) = (self.pairwise_sum(first), self.pairwise_sum(last));
-                self.add(first, last)
+                let (first, last) = (self.pairwise_sum(first, are_computed), self.pairwise_sum(last, are_computed));
+                if are_computed { self.unfused_sum(first, last) } else { self.add(first, last) }
             }
         }
     }

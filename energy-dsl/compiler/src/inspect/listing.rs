@@ -233,8 +233,11 @@ fn name_of(route: &Route) -> String {
     if route.factored {
         name += ", factored";
     }
-    if route.spelled_out {
+    if route.forms.spelled_out {
         name += ", inverses spelled out";
+    }
+    if route.forms.collapsed {
+        name += ", lengths and powers collapsed";
     }
     name
 }

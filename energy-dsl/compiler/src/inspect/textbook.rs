@@ -132,8 +132,7 @@ impl Textbook {
         self.everything.branches(&inputs.borrow(), &gradients)
     }
 
-    /// Returns the derivatives that some outputs use (0 for unused ones). Each is differentiated with an ε of its own
-    /// depth.
+    /// Returns the derivatives that some outputs use (0 for unused ones). Each nesting depth has its own ε.
     fn gradients<T: Number>(&self, outputs: &Interpreter, inputs: &TowerInputs<T>, depth: usize) -> Vec<Tower<T>> {
         let mut numbers = vec![Tower::from_f64(0.0); self.derivatives.len()];
         for number in outputs.precomputed() {

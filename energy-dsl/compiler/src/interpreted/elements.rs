@@ -11,8 +11,9 @@ use energy_runtime::{BatchError, Declaration, Flagged, Float, RoutineKind};
 /// Elements of one declaration, bound to their parameters and rest shapes.
 ///
 /// Methods take a range of elements that starts at a multiple of [`TAPE_BLOCK`](energy_runtime::tape::TAPE_BLOCK), and
-/// slices of that range alone: positions, p points of three coordinates per element, or the unknowns of a residual and of
-/// mixed declarations; and places for the results, 3 p numbers or one per increment. They return the indices and flags of flagged elements. Several threads may call them for different ranges.
+/// slices of that range alone. Inputs are positions, p points of three coordinates per element, or the unknowns of a
+/// residual and of mixed declarations. Gradients have 3 p numbers, or one per increment. Methods return the indices and
+/// flags of flagged elements. Several threads may call them for different ranges.
 #[derive(Clone, Debug)]
 pub struct Elements<S = f64> {
     element: Interpreted,

@@ -5,7 +5,7 @@ use energy_runtime::{Declaration, Kind, triangle_index};
 /// Indices among the results of a routine, in the order of the full matrices that callers want.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Layouts {
-    /// The first result: U.
+    /// The first result, the energy U.
     pub value: Vec<u16>,
     /// The first numbers, one per increment: a force.
     pub vectors: Vec<u16>,

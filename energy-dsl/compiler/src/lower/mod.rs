@@ -46,11 +46,10 @@ pub struct RestFormula {
 /// Sums of like terms become loops from this cost on. Below, unrolled terms share what they have in common.
 const LEAST_COST_OF_LOOPS: usize = 1000;
 
-/// What an element with memory needs beside its formula. States are inputs that derivatives can be taken with respect
-/// to.
+/// The formulas of an element with memory. States are inputs that derivatives can be taken with respect to.
 #[derive(Clone, Debug)]
 pub struct Memory {
-    /// The formula.
+    /// The formula of the element, with the state as an input.
     pub formula: Formula,
     /// The state after a step.
     pub next: Formula,

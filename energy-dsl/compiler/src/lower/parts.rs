@@ -9,11 +9,11 @@ use crate::graph::{Form, Graph, NodeId};
 
 /// A subexpression that computes numbers.
 pub struct LoweredPart<'a> {
-    /// The expression.
+    /// The expression in the source.
     pub expression: &'a Typed,
     /// Number of the binding whose value it is.
     pub binding: Option<usize>,
-    /// Its numbers.
+    /// Nodes of the components of its value.
     pub outputs: Vec<NodeId>,
     /// Subexpressions that it is computed from, by index.
     pub operands: Vec<usize>,

@@ -25,6 +25,8 @@ pub(super) struct Hazards {
 const SQUARE: u8 = 2;
 /// Operands up to 2²⁴⁰ (2³⁶ in single precision): their cubes, and those of their reciprocals, are numbers.
 pub(super) const DEGREE: u8 = 3;
+/// The largest degree of products of lengths that need no guard of their own: up to 2⁶⁴⁰ (2⁹⁶ in single precision).
+const LARGEST_DEGREE: u8 = 8;
 /// e⁸⁰ is a number in single precision, too.
 const LARGEST_EXPONENT: f64 = 80.0;
 
@@ -50,6 +52,20 @@ impl Hazards {
             let degree = if is_squared_length(g, a) { SQUARE } else { DEGREE };
             let moderate = g.is_moderate(a, degree);
             self.require(g, moderate);
+        }
+    }
+
+    /// Requires a divisor of moderate size. Lengths are guarded instead of their products.
+    fn require_divisor(&mut self, g: &mut Graph, b: NodeId) {
+        match lengths(g, b) {
+            Some((degree, squares)) if degree <= LARGEST_DEGREE => {
+                squares.into_iter().for_each(|square| self.require_moderate(g, square));
+            }
+            _ if matches!(g.op(b), Op::Sqrt(_)) => {}
+            _ => {
+                let size = g.abs(b);
+                self.require_moderate(g, size);
+            }
         }
     }
 
@@ -106,8 +122,7 @@ impl Hazards {
         let zero = g.constant(0.0);
         match g.op(node) {
             Op::Div(_, b) if g.as_constant(b).is_none() => {
-                let size = if is_squared_length(g, b) { b } else { g.abs(b) };
-                self.require_moderate(g, size);
+                self.require_divisor(g, b);
                 let by_zero = g.equal(b, zero);
                 self.flag(g, Flag::Kink, by_zero);
             }
@@ -185,10 +200,71 @@ pub(super) fn hazards(g: &mut Graph, roots: &[(NodeId, u8)]) -> Hazards {
 /// Returns whether a number is the square of a difference of points, twice the half that is a primitive.
 fn is_squared_length(g: &Graph, a: NodeId) -> bool {
     let Op::Mul(x, y) = g.op(a) else { return false };
-    [(x, y), (y, x)].into_iter().any(|(two, half)| {
-        let rule = g.rule(half).filter(|rule| g.is(two, 2.0) && rule.primitive == Primitive::InnerProduct);
-        rule.is_some_and(|rule| rule.arguments.len() < 4 && rule.arguments.iter().all(|&part| is_length(g, part)))
-    })
+    [(x, y), (y, x)].into_iter().any(|(two, half)| g.is(two, 2.0) && is_half_square(g, half))
+}
+
+fn is_half_square(g: &Graph, a: NodeId) -> bool {
+    let rule = g.rule(a).filter(|rule| rule.primitive == Primitive::InnerProduct);
+    rule.is_some_and(|rule| rule.arguments.len() < 4 && rule.arguments.iter().all(|&part| is_length(g, part)))
+}
+
+/// Returns the degree of a product of lengths, and those squared lengths among its factors that have no guards of their
+/// own; `None` for other numbers.
+fn lengths(g: &mut Graph, product: NodeId) -> Option<(u8, Vec<NodeId>)> {
+    match g.op(product) {
+        Op::Constant(_) => Some((0, Vec::new())),
+        Op::Mul(a, b) => {
+            let ((degree, mut squares), (other, others)) = (lengths(g, a)?, lengths(g, b)?);
+            squares.extend(others);
+            Some((degree.saturating_add(other), squares))
+        }
+        _ if is_half_square(g, product) => {
+            let two = g.constant(2.0);
+            Some((SQUARE, vec![g.mul(two, product)]))
+        }
+        _ if g.rule(product)?.primitive == Primitive::Norm => Some((1, Vec::new())),
+        _ => None,
+    }
+}
+
+/// Returns a flag without what cannot hold where the operands are `sound`: a number of moderate size is not 0.
+pub(super) fn unless_moderate(g: &mut Graph, flag: NodeId, sound: Option<NodeId>) -> NodeId {
+    match g.op(flag) {
+        Op::Or(a, b) => {
+            let [a, b] = [a, b].map(|flag| unless_moderate(g, flag, sound));
+            g.or(a, b)
+        }
+        Op::Equal(a, b) if sound.is_some_and(|sound| is_not_zero(g, [a, b], sound)) => g.truth(false),
+        _ => flag,
+    }
+}
+
+/// Returns whether one of two numbers is 0 and a mask says that the other one is not.
+fn is_not_zero(g: &Graph, [a, b]: [NodeId; 2], mask: NodeId) -> bool {
+    match [g.is(a, 0.0), g.is(b, 0.0)] {
+        [true, false] => is_nonzero(g, g.resolve(b), mask),
+        [false, true] => is_nonzero(g, g.resolve(a), mask),
+        _ => false,
+    }
+}
+
+/// Returns whether a number that divides is not 0 where a mask holds, because it or its factors are of moderate size.
+fn is_nonzero(g: &Graph, number: NodeId, mask: NodeId) -> bool {
+    is_moderate(g, number, mask)
+        || match g.op(number) {
+            Op::Constant(_) => !g.is(number, 0.0),
+            Op::Sqrt(a) => is_nonzero(g, g.resolve(a), mask),
+            Op::Mul(a, b) => [a, b].into_iter().all(|factor| is_nonzero(g, g.resolve(factor), mask)),
+            _ => false,
+        }
+}
+
+fn is_moderate(g: &Graph, number: NodeId, mask: NodeId) -> bool {
+    match g.op(mask) {
+        Op::And(a, b) => is_moderate(g, number, a) || is_moderate(g, number, b),
+        Op::IsModerate(size, _) => g.resolve(size) == number || g.op(g.resolve(size)) == Op::Abs(number),
+        _ => false,
+    }
 }
 
 /// Returns the condition of a selection.

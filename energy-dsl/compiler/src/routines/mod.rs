@@ -18,7 +18,7 @@ use crate::diff::{
 use crate::graph::{Graph, Input, NodeId, Op, general, ordinary, with_signs_inside};
 use crate::lower::{Formula, LoweredProgram, Repetition, RestFormula};
 use energy_runtime::{FieldKind, Flag, Kind, RoutineKind};
-use hazards::{Hazards, hazards, operations};
+use hazards::{Hazards, hazards, operations, unless_moderate};
 use range::Tests;
 
 /// A routine to be generated.
@@ -116,9 +116,10 @@ impl Whole {
         // Before results are expanded to points, they are fewer. The values come first.
         let values = if self.kind.has_values() { self.groups[0].len().min(self.reduced.len()) } else { 0 };
         let (values, derivatives) = self.reduced.split_at(values);
-        let tests = Tests::of(g, guards, derivatives);
+        let tests = Tests::of(g, guards, values, derivatives);
         guards.extend(tests.guards(g));
-        tests.finite(g, values)
+        let outputs = self.groups.iter().flatten().map(|&output| g.resolve(output)).collect();
+        tests.finite(g, &outputs)
     }
 
     /// Flags rotations whose quaternions are not of unit length. Nothing has a limit there.
@@ -148,7 +149,10 @@ impl Whole {
         let nodes = with_signs_inside(g, &nodes);
         let ordinary = self.with(g, &nodes);
         let Hazards { flags, sound, .. } = ordinary.hazards;
-        let unflagged = flags.into_iter().flatten().map(|flag| g.not(flag)).collect::<Vec<_>>();
+        let bounds = sound.into_iter().chain(moderate).reduce(|a, b| g.and(a, b));
+        let mut open: Vec<NodeId> = flags.into_iter().flatten().map(|flag| unless_moderate(g, flag, bounds)).collect();
+        open.retain(|&flag| g.op(flag) != Op::Truth(false));
+        let unflagged: Vec<NodeId> = open.into_iter().map(|flag| g.not(flag)).collect();
         // Outside of the domain, results are not numbers, and nothing else guards against that.
         let always = outside.map(|_| g.truth(true));
         let mut guards: Vec<NodeId> = moderate.into_iter().chain(sound).chain(unflagged).chain(always).collect();

@@ -24,17 +24,22 @@ struct Range {
 }
 
 const DOUBLE: Range = Range { largest: 1016, length: 80, parameter: 200 };
+/// With a narrower guard on parameters, larger products of them are bounded.
+const NARROW: Range = Range { parameter: 64, ..DOUBLE };
 const SINGLE: Range = Range { largest: 120, length: 12, parameter: 46 };
 /// The exponent of a number without a bound.
 const UNKNOWN: u32 = 1 << 16;
 /// The exponent of e⁸⁰, which guards allow.
 const EXPONENTIAL: u32 = 116;
+/// The most inputs whose guards are known.
+const BITS: usize = 128;
 /// The degree of guards on operands that are not lengths.
 const OPERAND: u8 = super::hazards::DEGREE;
 
 /// Tests of the ordinary path of a routine.
-#[derive(Default)]
 pub(super) struct Tests {
+    /// The ranges of inputs in double and in single precision.
+    ranges: [Range; 2],
     /// Results that must be finite.
     results: Vec<NodeId>,
     /// Results that must be finite in single precision. In double precision, they are.
@@ -48,40 +53,89 @@ pub(super) struct Tests {
 }
 
 impl Tests {
-    /// Looks at derivatives on the ordinary path, whose guards hold. Without guards there is no other path for large
-    /// inputs, so that results are tested instead. So they are if that takes fewer operations.
-    pub(super) fn of(g: &Graph, guards: &[NodeId], derivatives: &[NodeId]) -> Self {
-        let [double, single] = [DOUBLE, SINGLE].map(|range| Analysis::new(g, range, guards, derivatives));
-        let (mut tests, mut others) = (Self::default(), BTreeSet::new());
+    /// Looks at results on the ordinary path, whose guards hold.
+    pub(super) fn of(g: &Graph, guards: &[NodeId], values: &[NodeId], derivatives: &[NodeId]) -> Self {
+        let candidates = [DOUBLE, NARROW].map(|double| Self::within(g, [double, SINGLE], guards, values, derivatives));
+        candidates.into_iter().min_by_key(Self::operations).expect("two candidates")
+    }
+
+    fn within(g: &Graph, ranges: [Range; 2], guards: &[NodeId], values: &[NodeId], derivatives: &[NodeId]) -> Self {
+        let all = [values, derivatives].concat();
+        let analyses = ranges.map(|range| Analysis::new(g, range, guards, &all));
+        let mut tests = Self::none(ranges).of_derivatives(g, derivatives, &analyses);
+        let may_overflow = |derivative: &&NodeId| analyses[0].of_result(g, **derivative).may_overflow();
+        let products: Vec<NodeId> = derivatives.iter().filter(may_overflow).copied().collect();
+        // A polynomial has no other path than the ordinary one, and needs none if its results are tested.
+        let most = if guards.is_empty() { 3 * products.len() / 4 } else { products.len() };
+        if tests.operations() > most {
+            tests = Self { results: products, ..Self::none(ranges) };
+        }
+        for &value in values {
+            let [in_double, in_single] = analyses.each_ref().map(|analysis| tests.bound(g, value, analysis));
+            match (in_double, in_single) {
+                (true, true) => {}
+                (true, false) => tests.single.push(value),
+                _ => tests.results.push(value),
+            }
+        }
+        tests
+    }
+
+    fn none(ranges: [Range; 2]) -> Self {
+        let (results, single) = (Vec::new(), Vec::new());
+        let (parameters, lengths, divisors) = (BTreeSet::new(), BTreeSet::new(), BTreeMap::new());
+        Self { ranges, results, single, parameters, lengths, divisors }
+    }
+
+    fn of_derivatives(mut self, g: &Graph, derivatives: &[NodeId], [double, single]: &[Analysis; 2]) -> Self {
+        let mut others = BTreeSet::new();
         for &derivative in derivatives {
-            let [in_double, in_single] = [&double, &single].map(|analysis| analysis.sizes[&g.resolve(derivative)]);
-            if !in_double.is_product && in_double.exponent < UNKNOWN {
+            let [in_double, in_single] = [double, single].map(|analysis| analysis.of_result(g, derivative));
+            if !in_double.may_overflow() {
                 continue;
             }
-            if guards.is_empty() || in_double.total(DOUBLE) > DOUBLE.largest {
-                tests.results.push(derivative);
+            if !double.fits(in_double) {
+                self.results.push(derivative);
                 continue;
             }
-            if in_single.total(SINGLE) > SINGLE.largest {
-                tests.single.push(derivative);
+            if !single.fits(in_single) {
+                self.single.push(derivative);
             }
             for (node, unbounded) in double.inputs(in_double.inputs) {
                 match unbounded {
-                    Unbounded::Parameter => _ = tests.parameters.insert(node),
-                    Unbounded::Length => _ = tests.lengths.insert(node),
-                    Unbounded::Divisor(degree) => _ = tests.divisors.insert(node, degree),
+                    Unbounded::Parameter => _ = self.parameters.insert(node),
+                    Unbounded::Length => _ = self.lengths.insert(node),
+                    Unbounded::Divisor(degree) => _ = self.divisors.insert(node, degree),
                 }
                 if !matches!(unbounded, Unbounded::Parameter) {
                     others.insert(derivative);
                 }
             }
         }
-        tests.with_the_cheaper(&others)
+        self.with_the_cheaper(&others)
+    }
+
+    /// Returns the number of operations that the tests take.
+    fn operations(&self) -> usize {
+        // A square and its sum are two operations, and so are the two comparisons of a divisor.
+        self.results.len() + 2 * (self.parameters.len() + self.lengths.len() + self.divisors.len())
+    }
+
+    /// Returns whether the guards bound a value and all inputs that it depends on, so that it needs no test.
+    fn bound(&self, g: &Graph, value: NodeId, analysis: &Analysis) -> bool {
+        let is_guarded = |(node, unbounded): (NodeId, Unbounded)| match unbounded {
+            Unbounded::Parameter => self.parameters.contains(&node),
+            Unbounded::Length => self.lengths.contains(&node),
+            Unbounded::Divisor(_) => self.divisors.contains_key(&node),
+        };
+        let size = analysis.of_result(g, value);
+        analysis.fits(size)
+            && analysis.inputs(size.inputs).all(is_guarded)
+            && reachable(g, &[value]).into_iter().all(|node| is_algebraic(g, node))
     }
 
     /// Tests results that depend on lengths instead of these lengths, if that takes fewer operations.
     fn with_the_cheaper(mut self, results: &BTreeSet<NodeId>) -> Self {
-        // A square and its sum are two operations, and so are the two comparisons of a divisor.
         if results.len() < 2 * (self.lengths.len() + self.divisors.len()) {
             self.lengths.clear();
             self.divisors.clear();
@@ -94,7 +148,8 @@ impl Tests {
     /// Creates the masks where inputs are far from overflow.
     pub(super) fn guards(&self, g: &mut Graph) -> Vec<NodeId> {
         let mut guards = Vec::new();
-        let (parameters, lengths) = ([DOUBLE.parameter, SINGLE.parameter], [DOUBLE.length, SINGLE.length]);
+        let parameters = self.ranges.map(|range| range.parameter);
+        let lengths = self.ranges.map(|range| range.length);
         for (inputs, exponents) in [(&self.parameters, parameters), (&self.lengths, lengths)] {
             if !inputs.is_empty() {
                 let square = g.sum_of_squares(&inputs.iter().copied().collect::<Vec<_>>());
@@ -110,24 +165,30 @@ impl Tests {
         guards
     }
 
-    /// Creates the mask where the values and all tested results are finite.
-    pub(super) fn finite(&self, g: &mut Graph, values: &[NodeId]) -> NodeId {
-        let finite = is_finite(g, values.iter().chain(&self.results));
+    /// Creates the mask where all tested results are finite.
+    pub(super) fn finite(&self, g: &mut Graph, outputs: &BTreeSet<NodeId>) -> NodeId {
+        let finite = is_finite(g, &self.results, outputs);
         if self.single.is_empty() {
             return finite;
         }
-        let (in_single, is_double) = (is_finite(g, &self.single), g.is_double());
+        let (in_single, is_double) = (is_finite(g, &self.single, outputs), g.is_double());
         let holds = g.or(is_double, in_single);
         g.and(finite, holds)
     }
 }
 
-/// Creates the mask where the sum of some results is finite.
-fn is_finite<'a>(g: &mut Graph, results: impl IntoIterator<Item = &'a NodeId>) -> NodeId {
+/// Creates the mask where the sum of some results is finite. Some are outputs, the others are parts of outputs.
+fn is_finite(g: &mut Graph, results: &[NodeId], outputs: &BTreeSet<NodeId>) -> NodeId {
     // A result and its opposite would cancel.
-    let results: BTreeSet<NodeId> = results.into_iter().map(|&result| g.magnitude(result).0).collect();
-    let results: Vec<NodeId> = results.into_iter().collect();
-    let (sum, infinity) = (g.pairwise_sum(&results), g.constant(f64::INFINITY));
+    let results: BTreeMap<NodeId, NodeId> = results.iter().map(|&result| (g.magnitude(result).0, result)).collect();
+    let (computed, others): (Vec<NodeId>, Vec<NodeId>) =
+        results.into_values().partition(|&result| outputs.contains(&g.resolve(result)));
+    let parts = [(computed, true), (others, false)].into_iter().filter(|(results, _)| !results.is_empty());
+    let sums: Vec<NodeId> = parts.map(|(results, are_outputs)| g.pairwise_sum(&results, are_outputs)).collect();
+    if sums.is_empty() {
+        return g.truth(true);
+    }
+    let (sum, infinity) = (g.pairwise_sum(&sums, true), g.constant(f64::INFINITY));
     let size = g.abs(sum);
     g.less(size, infinity)
 }
@@ -176,6 +237,11 @@ impl Size {
             is_product: self.is_product || other.is_product || !self.is_small() && !other.is_small(),
             ..self.plus(other)
         }
+    }
+
+    /// Returns whether it may be infinite where its inputs are not.
+    fn may_overflow(self) -> bool {
+        self.is_product || self.exponent >= UNKNOWN
     }
 
     /// Returns the degree of a positive power of a length.
@@ -259,14 +325,28 @@ impl Analysis {
 
     /// Returns the numbers without guards that a size depends on.
     fn inputs(&self, inputs: u128) -> impl Iterator<Item = (NodeId, Unbounded)> {
-        self.unbounded.iter().enumerate().filter(move |(bit, _)| inputs >> bit & 1 == 1).map(|(_, &input)| input)
+        self.unbounded
+            .iter()
+            .take(BITS)
+            .enumerate()
+            .filter(move |(bit, _)| inputs >> bit & 1 == 1)
+            .map(|(_, &input)| input)
+    }
+
+    /// Returns whether numbers of a size are finite.
+    fn fits(&self, size: Size) -> bool {
+        size.total(self.range) <= self.range.largest
+    }
+
+    fn of_result(&self, g: &Graph, result: NodeId) -> Size {
+        self.sizes[&g.resolve(result)]
     }
 
     fn of(&mut self, g: &Graph, node: NodeId) -> Size {
         let size = |operand: NodeId| self.sizes[&g.resolve(operand)];
         match g.fused(node) {
-            _ if is_length(g, node) => self.unbounded(node, Unbounded::Length, Size::of_length(2)),
-            Op::Input(_) => self.unbounded(node, Unbounded::Parameter, Size::of(self.range.parameter)),
+            _ if is_length(g, node) => self.unbounded(g, node, Unbounded::Length, Size::of_length(2)),
+            Op::Input(_) => self.unbounded(g, node, Unbounded::Parameter, Size::of(self.range.parameter)),
             Op::Constant(bits) => Size::of(exponent_of(f64::from_bits(bits))),
             Op::Neg(a) | Op::Abs(a) => size(a),
             Op::Add(a, b) | Op::Sub(a, b) | Op::Min(a, b) | Op::Max(a, b) | Op::Select(_, a, b) => {
@@ -297,13 +377,13 @@ impl Analysis {
     }
 
     /// Returns the size that a number without a guard has once it is guarded.
-    fn unbounded(&mut self, node: NodeId, what: Unbounded, size: Size) -> Size {
-        let known = self.unbounded.iter().position(|&(other, _)| other == node);
+    fn unbounded(&mut self, g: &Graph, node: NodeId, what: Unbounded, size: Size) -> Size {
+        let known = self.unbounded.iter().position(|&(other, _)| other == node || is_opposite(g, other, node));
         let bit = known.unwrap_or(self.unbounded.len());
         if known.is_none() {
             self.unbounded.push((node, what));
         }
-        if bit < 128 { Size { inputs: 1 << bit, ..size } } else { Size::of(UNKNOWN) }
+        if bit < BITS { Size { inputs: 1 << bit, ..size } } else { Size::of(UNKNOWN) }
     }
 
     /// Returns the size of 1/b.
@@ -322,10 +402,26 @@ impl Analysis {
                 None => Size::of(UNKNOWN),
             },
             Op::Exp(_) => Size::of(EXPONENTIAL),
-            _ => match self.sizes.get(&b).and_then(|size| size.power_of_length()) {
-                Some(degree) => self.unbounded(b, Unbounded::Divisor(degree), Size::of_length(-2 * i32::from(degree))),
-                None => Size::of(UNKNOWN),
-            },
+            _ => {
+                let Some(size) = self.sizes.get(&b) else { return Size::of(UNKNOWN) };
+                let (degree, reciprocal) = match size.power_of_length() {
+                    Some(degree) => (degree, Size::of_length(-2 * i32::from(degree))),
+                    None => (OPERAND, Size::of(self.range.length * u32::from(OPERAND))),
+                };
+                self.unbounded(g, b, Unbounded::Divisor(degree), reciprocal)
+            }
+        }
+    }
+}
+
+/// Returns whether a result is NaN if an operand is, and bounded by its operands.
+fn is_algebraic(g: &Graph, node: NodeId) -> bool {
+    match g.fused(node) {
+        Op::Input(_) | Op::Constant(_) | Op::Pi | Op::Neg(_) | Op::Abs(_) | Op::Sqrt(_) => true,
+        Op::Add(..) | Op::Sub(..) | Op::Mul(..) | Op::Div(..) => true,
+        op => {
+            matches!(op, Op::FusedMulSub(..) | Op::MulAdd(..) | Op::MulSub(..) | Op::NegMulAdd(..) | Op::NegMulSub(..))
+                || matches!(op, Op::SumError(..) | Op::ProductError(..) | Op::RootError(..) | Op::DifferenceError(..))
         }
     }
 }
@@ -334,6 +430,11 @@ impl Analysis {
 fn exponent_of(constant: f64) -> u32 {
     let exponent = constant.abs().log2().ceil();
     if exponent.is_finite() { exponent.max(0.0) as u32 } else { u32::from(constant != 0.0) * UNKNOWN }
+}
+
+/// Returns whether two numbers are a − b and b − a.
+fn is_opposite(g: &Graph, x: NodeId, y: NodeId) -> bool {
+    matches!((g.op(x), g.op(y)), (Op::Sub(a, b), Op::Sub(c, d)) if (a, b) == (d, c))
 }
 
 /// Returns whether a number is a coordinate, or a difference of coordinates.

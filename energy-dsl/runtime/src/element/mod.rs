@@ -1,5 +1,5 @@
-//! The traits of generated elements. An element stores its parameters and what its rest shape determines; its methods
-//! take the moving points.
+//! The traits of generated elements. An element stores its parameters and numbers that its rest shape determines; its
+//! methods take the moving points.
 //!
 //! Storage of second derivatives:
 //!

@@ -65,7 +65,7 @@ impl BitOr for Undefined {
 pub(super) struct Sum {
     part: Rows,
     others: Vec<Rows>,
-    /// Where the number is undefined. Coefficients are 0 there.
+    /// Rays along which the number is undefined. Coefficients are 0 there.
     undefined: Undefined,
 }
 

@@ -75,7 +75,8 @@ impl Order {
         Self { power: self.power + steps as f64, ..self }
     }
 
-    /// Returns the whole powers of ε from a larger order to this one, if rows have so many.
+    /// Returns the number of whole powers of ε from a larger order to this one; `None` if it is not whole or exceeds
+    /// the length of rows.
     pub(super) fn row_from(self, first: Self) -> Option<usize> {
         let step = self.power - first.power;
         let is_row = self.logs == first.logs && step == step.round() && (0.0..length() as f64).contains(&step);

@@ -20,7 +20,7 @@ use super::real::{Mask, Number};
 pub enum TraceStep {
     /// An argument, by number.
     Argument(usize),
-    /// A constant. Those of single precision are exact.
+    /// A numeric constant. Those of single precision are exact.
     Constant(f64),
     /// An operation by name: that of the method of [`Number`] or of bit patterns that computes it.
     Operation(&'static str, Vec<usize>),
@@ -33,7 +33,7 @@ pub struct Trace {
     pub name: &'static str,
     /// Number of arguments.
     pub arguments: usize,
-    /// The statements. The last one is the result.
+    /// Statements in the order of execution. The last one is the result.
     pub steps: Vec<TraceStep>,
 }
 
@@ -208,7 +208,7 @@ impl Mask for TracedMask {
     }
 }
 
-/// What would make a trace depend on the numbers.
+/// The panic message of operations that would make a trace depend on the numbers.
 const BRANCHES: &str = "elementary functions do not look at masks or single lanes";
 
 macro_rules! numbers {
@@ -387,7 +387,7 @@ mod tests {
                 assert!(found.to_bits() == expected.to_bits() || found.is_nan() && expected.is_nan(), "{}", trace.name);
             }
         }
-        // Not a level of its own: constants and operations are those of single precision.
+        // Single precision is not a level: its traces have other constants and operations.
         let single = &elementary_functions(true)[2];
         assert!(single.steps.len() < traces[2].steps.len(), "a shorter polynomial");
         assert!(Number::exp::<Baseline>(1.0_f32) > 2.7);

@@ -124,7 +124,7 @@ impl<S: Scalar> Unbounded<S> {
 
     /// Returns ln 2 in two parts.
     fn ln_2() -> (S, S) {
-        // What the nearest double lacks.
+        // ln 2 minus the nearest double.
         const REST: f64 = 2.319_046_813_846_299_6e-17;
         let high = S::nearest(std::f64::consts::LN_2);
         (high, S::nearest((std::f64::consts::LN_2 - high.to_f64()) + REST))
@@ -415,7 +415,7 @@ mod tests {
         let tiny = of(-1000.0).exp::<Baseline>();
         assert_eq!(tiny.to_scalar(), 0.0);
         assert!(((tiny * of(500.0).exp::<Baseline>()).to_scalar() / (-500.0_f64).exp() - 1.0).abs() < 1e-13);
-        // Beyond 2²⁵, eˣ is 0 or infinite: x has too few bits after the point.
+        // For |x| > 2²⁵, eˣ is 0 or infinite: x has too few bits after the point.
         let both = |x: f64| (of(-x).exp::<Baseline>() * of(x).exp::<Baseline>()).to_scalar();
         assert!((both(3.3e7) - 1.0).abs() < 1e-6 && both(3.4e7).is_nan());
     }

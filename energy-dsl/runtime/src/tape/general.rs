@@ -19,7 +19,7 @@ pub struct GeneralPath {
     pub values_first: bool,
     /// Whether the first group is an energy. It is infinite outside of its domain.
     pub is_energy: bool,
-    /// The path. The first slots hold its inputs.
+    /// Instructions of the path. The first slots hold its inputs.
     pub tape: Tape,
     /// Slots of the results, in the order of the routine's results.
     pub results: Vec<u16>,

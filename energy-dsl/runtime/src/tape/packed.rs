@@ -188,8 +188,7 @@ impl<S: Float> TapeElements<S> {
         }))
     }
 
-    /// Replaces consecutive numbers of the parameters, from `first` on. The numbers of the `rest` block stay as they
-    /// are.
+    /// Replaces consecutive numbers of the parameters, from `first` on. The numbers of the `rest` block do not change.
     ///
     /// # Panics
     /// When the column does not have `size` numbers, of each element or of all, or the parameters end before.

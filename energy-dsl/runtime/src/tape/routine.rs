@@ -86,7 +86,7 @@ pub struct General {
     pub ordinary: u16,
     /// Indices among the inputs of the routine, in the order of the path's inputs.
     pub inputs: Vec<u16>,
-    /// The path.
+    /// Tape, results and flags of the path.
     pub path: GeneralPath,
 }
 

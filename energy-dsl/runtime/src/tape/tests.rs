@@ -185,7 +185,7 @@ fn elements_keep_their_numbers() {
 fn general_paths_replace_the_results_that_need_them() {
     let mut routines = Arc::unwrap_or_clone(routines());
     let force = &mut routines.list[0];
-    // Where coordinate 2 is 0, all results are 2 times coordinate 3, and coordinate 4 below 0 is out of the domain.
+    // If coordinate 2 is 0, all results are 2 times coordinate 3, and coordinate 4 below 0 is out of the domain.
     force.tape.masks = 4;
     force.tape.instructions.extend([instruction(Operation::Equal, 2, &[2, 8]), instruction(Operation::Not, 3, &[2])]);
     let double = Tape {

@@ -21,7 +21,7 @@ pub(crate) struct Triangle<T> {
     pub(super) inner_end: Vec<u32>,
     /// The blocks, each row by row.
     numbers: Vec<T>,
-    /// Where the blocks are if there are more than those of the pattern.
+    /// Layout of the blocks if the pattern lacks some of them; `None` otherwise.
     extended: Option<Extended>,
 }
 
@@ -100,7 +100,7 @@ impl<T: Precision> Triangle<T> {
         self.extended.is_some()
     }
 
-    /// Makes room for blocks that the pattern lacks, or takes it back if there are none.
+    /// Makes room for blocks that the pattern lacks. Without such blocks, frees the room.
     pub(super) fn extend(&mut self, pattern: &Pattern, cross: &CrossBlocks) {
         let Self { rows, extended, numbers, .. } = self;
         let blocks = if cross.is_empty() {

@@ -119,7 +119,7 @@ struct Edge<V: Lane<f64>> {
     vector: [V; 3],
     /// ê.
     unit: [V; 3],
-    /// L.
+    /// Length L.
     length: V,
     /// 1/L².
     per_squared: V,
@@ -141,7 +141,7 @@ impl<V: Lane<f64>> Edge<V> {
 struct Wing<V: Lane<f64>> {
     n: [V; 3],
     t: [V; 3],
-    /// s.
+    /// The fraction s of the edge at the foot of the height.
     foot: V,
     /// 1/h.
     per_height: V,

@@ -1,9 +1,9 @@
 //! The law of a membrane as a function of the Green strain, from the declared energy of a triangle.
 //!
-//! A membrane's energy per area depends on the metric C = 1 + 2E alone. For a given E, a triangle with a right angle is
-//! laid into a plane such that its sides along warp and weft, per length at rest, are a = (p, 0) and b = (q, r) with
-//! C_uu = p², C_uv = p q, C_vv = q² + r². The element's derivatives with respect to w = (p, q, r) give stress S = ∂W/∂E
-//! and moduli ∂S/∂E:
+//! A membrane's energy per area depends on the metric C = 1 + 2E alone. For a given E, a right-angled triangle is laid
+//! into a plane. Its sides along warp and weft, per length at rest, are a = (p, 0) and b = (q, r) with C_uu = p²,
+//! C_uv = p q, C_vv = q² + r². The element's derivatives with respect to w = (p, q, r) give stress S = ∂W/∂E and moduli
+//! ∂S/∂E:
 //!
 //! g = Lᵀ S and H = Lᵀ (∂S/∂E) L + Σ S ∂²E/∂w², with L = ∂E/∂w = [[p, 0, 0], [0, q, r], [q, p, 0]]
 //!

@@ -1,6 +1,6 @@
 //! Nonlinear elimination: Newton's method on the few vertices that hold up the others.
 //!
-//! Where cloth buckles or touches an obstacle, E is far from quadratic, but only at a few vertices. Every iteration on
+//! E is far from quadratic where cloth buckles or touches an obstacle, but only at a few vertices. Every iteration on
 //! them costs an iteration on all vertices. A local elimination splits the free vertices into the few V that the last
 //! iteration moved far, and the others W. It minimises E over V alone before the next iteration on all vertices:
 //!
@@ -163,8 +163,8 @@ mod tests {
     use crate::body::Body;
     use crate::mesh::{Diagonals, Plane, Sheet, lumped_masses};
 
-    /// A strip that is one tenth too long for its pinned ends, with a wrinkle. Its membrane is a term of its own: those
-    /// of a fabric would compile the kernels of all materials.
+    /// A strip that is one tenth too long for its pinned ends, with a wrinkle. Its membrane is a separate term: the
+    /// terms of a fabric would compile the kernels of all materials.
     fn strip() -> Body {
         let (diagonals, plane) = (Diagonals::Alternating, Plane::Horizontal);
         let mesh = Sheet { cells: [20, 5], size: [0.4, 0.1], diagonals, plane, pleats: None }.mesh().unwrap();

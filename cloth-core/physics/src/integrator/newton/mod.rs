@@ -32,9 +32,9 @@ use iterate::Iterate;
 ///   project each element's Hessian to positive semi-definite: projection on demand (Longva, Löschner,
 ///   Fernández-Fernández, Larionov, Ascher and Bender 2023). A body that collides does so after directions that
 ///   lead nowhere, and after steps that contact shortened.
-/// - After an iteration that moves fewer than 15 % of the free vertices by more than a tenth of the largest move, these
-///   vertices proceed with up to four iterations of their own: nonlinear elimination (Cai and Keyes 2002). Bodies
-///   with a term that cannot be restricted ([`PlacedTerm::restricted`]) do without.
+/// - After an iteration that moves fewer than 15 % of the free vertices by more than a tenth of the largest move, up to
+///   four more iterations move these vertices alone: nonlinear elimination (Cai and Keyes 2002). Bodies with a term
+///   that cannot be restricted ([`PlacedTerm::restricted`]) do without.
 /// - Every step follows a descent direction and is halved until it lowers E. Projected Hessians are too stiff, so their
 ///   steps are doubled as long as that lowers E further.
 ///

@@ -65,7 +65,7 @@ pub struct ObjOptions<'a> {
 /// A surface from an OBJ file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ObjSurface {
-    /// The mesh. Vertices that no face uses are left out; the others keep their order.
+    /// Triangles and vertices. Vertices that no face uses are left out; the others keep their order.
     pub mesh: TriangleMesh,
     /// Texture coordinates and normals of the corners.
     pub corners: CornerAttributes,
@@ -122,8 +122,8 @@ fn chosen_faces<'a>(file: &'a ObjFile, path: &Path, groups: Option<&[String]>) -
     Ok(file.faces.iter().copied().filter(is_wanted).collect())
 }
 
-/// The triangles of faces, with vertices numbered from 0 without unused ones. Triangles are formed as they are visited:
-/// a file may have one for every two of its bytes.
+/// The triangles of faces, with vertices numbered from 0 without unused ones. Triangles are formed only when they are
+/// visited: a file may have one for every two of its bytes.
 struct Triangulation<'a> {
     file: &'a ObjFile,
     faces: Cow<'a, [Face]>,
@@ -147,7 +147,7 @@ struct Part {
     vertices: [usize; 3],
 }
 
-/// Stands for no vertex. Files are too small for so many.
+/// Marks unused vertices. Files are too small to have this index.
 const UNUSED: u32 = u32::MAX;
 
 impl<'a> Triangulation<'a> {

@@ -187,7 +187,7 @@ impl Element<'_> {
         Argument { of_type: to.of_type, ..vector.clone() }.each(&format!("adj_{}", to.name), add)
     }
 
-    /// Writes the gradient to an array of its own.
+    /// Writes the gradient to a separate array.
     fn slopes(&self) -> String {
         let (real, size) = (self.dialect.precision.real(), self.plan.declaration.increments());
         format!(

@@ -152,7 +152,7 @@ mod tests {
                 }
             }
         }
-        // What hosts need in C, and what Warp cannot read inside of a function, is left out.
+        // Code for C hosts, and statements that Warp cannot read inside of a function, are left out.
         assert!(!text.contains("_element") && !text.contains("#include") && text.contains("energy_f64_run_tape"));
         let (_, single) = text.split_once("_F32 = ").expect("it is in single precision, too");
         let code = single.lines().filter(|line| line.contains("energy_") && !line.trim_start().starts_with("/*"));

@@ -51,8 +51,8 @@ pub(super) fn remainder(g: &mut Graph, expansion: Expansion, k: u32, x: NodeId) 
     g.add_rule(Rule::smooth(primitive, vec![x], value, vec![first], vec![second]), &[])
 }
 
-/// Creates xᵏ Φₖ(x), k > 1, with its derivatives xᵏ⁻¹ Φₖ₋₁ and xᵏ⁻² Φₖ₋₂; those of the logarithm are xᵏ⁻¹/(1 + x) and
-/// xᵏ⁻² (k − 1 + (k − 2) x)/(1 + x)², those of the incomplete gamma function xᵏ⁻¹ e⁻ˣ/(k − 1)! and
+/// Creates xᵏ Φₖ(x), k > 1, with its derivatives xᵏ⁻¹ Φₖ₋₁ and xᵏ⁻² Φₖ₋₂. For the logarithm they are xᵏ⁻¹/(1 + x) and
+/// xᵏ⁻² (k − 1 + (k − 2) x)/(1 + x)². For the incomplete gamma function they are xᵏ⁻¹ e⁻ˣ/(k − 1)! and
 /// xᵏ⁻² (k − 1 − x) e⁻ˣ/(k − 1)!.
 pub(super) fn whole_remainder(g: &mut Graph, expansion: Expansion, k: u32, x: NodeId) -> NodeId {
     let powers = [k, k - 1, k - 2].map(|exponent| {

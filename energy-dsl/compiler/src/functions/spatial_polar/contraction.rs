@@ -1,7 +1,8 @@
 //! Weighted sums of second derivatives in closed form.
 //!
-//! For the entries of R, with M = RᵀW, a = Σ wᵢ × rᵢ and b = K⁻¹ a, it is ω(X)·(M − S \[b\]ₓ − tr M) ω(Y) + c(X)·ω(Y) + c(Y)·ω(X), where
-//! c = (b·rₖ) eₗ − Rₖₗ b for X = eₖ eₗᵀ. The first matrix is symmetric, as S \[b\]ₓ + \[b\]ₓ S = \[a\]ₓ.
+//! Let M = RᵀW, a = Σ wᵢ × rᵢ and b = K⁻¹ a. For the entries of R, the sum is
+//! ω(X)·(M − S \[b\]ₓ − tr M) ω(Y) + c(X)·ω(Y) + c(Y)·ω(X). Here c = (b·rₖ) eₗ − Rₖₗ b for X = eₖ eₗᵀ. The first matrix
+//! is symmetric, as S \[b\]ₓ + \[b\]ₓ S = \[a\]ₓ.
 
 use super::Decomposition;
 use super::matrix::{Matrix, Vector, product, rows, symmetric, times, trace, transposed};
@@ -86,7 +87,7 @@ pub(super) fn of_stretch(g: &mut Graph, at: &Decomposition, arguments: &[NodeId]
     Contraction { family, fewest: 1, values, arguments: arguments.to_vec(), factors, first: None, second: of_norms }
 }
 
-/// Returns Σ wᵢ ∇²vᵢ with the Hessian a(X)·ω(Y) of tr S. That of the distance is 0 where there is no rotation.
+/// Returns Σ wᵢ ∇²vᵢ with the Hessian a(X)·ω(Y) of tr S. The Hessian of the distance is 0 where R is not defined.
 fn of_norms(g: &mut Graph, factors: &[NodeId], weights: &[NodeId]) -> Vec<Vec<Product>> {
     let ([scale, degenerate], vectors_of) = ([factors[0], factors[1]], &factors[2..56]);
     let zero = g.constant(0.0);

@@ -161,7 +161,7 @@ impl Decomposition {
         g.dot(&self.spins[x], &self.turns[y])
     }
 
-    /// Notes the contraction of the functions of S that are known. It has none if nothing moves.
+    /// Notes the contraction of the known functions of S, if there are any.
     fn note_stretch(&self, g: &mut Graph, arguments: &[NodeId]) {
         let contraction = contraction::of_stretch(g, self, arguments);
         if !contraction.values.is_empty() {

@@ -2,9 +2,9 @@ use super::{Bits, Format, Unary, fast_sum, horner, huge_angle, polynomial};
 use crate::numbers::cpu::Scalar;
 use crate::numbers::level::Level;
 
-/// The sine.
+/// Sine of an angle in rad.
 pub struct Sin;
-/// The cosine.
+/// Cosine of an angle in rad.
 pub struct Cos;
 
 /// The constants of sine and cosine in one precision, and how it reduces angles.
@@ -82,7 +82,7 @@ impl Trigonometry for f32 {
 
     #[inline(always)]
     fn remainder<D: Bits<Format = Self>, L: Level>(x: D, count: D) -> (D, D) {
-        // π/2 in three parts: the nearest number, and what remains.
+        // π/2 in three parts: the nearest number, and the rest in two.
         let [a, b, c] = [std::f32::consts::FRAC_PI_2, -4.371_139e-8, -1.715_124_5e-15].map(D::splat);
         // Exact at all levels: a multiple of the last bit of `a`, or of an `x` below 1, of magnitude below 1.
         let first = -count.fused_mul_sub::<L>(a, x);

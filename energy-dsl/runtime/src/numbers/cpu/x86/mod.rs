@@ -62,8 +62,8 @@ pub fn detected() -> LevelName {
 pub(super) fn run_at<K: Kernel>(name: LevelName, kernel: K) -> K::Output {
     debug_assert!(name <= detected(), "{name} is not available");
     match name {
-        // SAFETY: callers, all in the parent module, pass what `detected` allows or what the program was compiled to
-        // require.
+        // SAFETY: callers, all in the parent module, pass levels that `detected` allows or that the program was
+        // compiled to require.
         LevelName::Avx512 => unsafe { run_avx512(kernel) },
         // SAFETY: as above.
         LevelName::Avx2 => unsafe { run_avx2(kernel) },
@@ -85,7 +85,7 @@ pub(super) fn run_scalar<K: Kernel>(name: LevelName, kernel: K) -> K::Output {
 /// Reads a number by a separate load. Volatile loads are not merged into wider ones.
 #[inline(always)]
 pub(crate) fn read_alone<T: Copy>(number: &T) -> T {
-    // SAFETY: a reference is valid for reads, aligned and initialised, and what it refers to is `Copy`.
+    // SAFETY: a reference is valid for reads, aligned and initialised, and `T` is `Copy`.
     unsafe { std::ptr::read_volatile(number) }
 }
 
