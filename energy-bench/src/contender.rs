@@ -41,6 +41,29 @@ impl Serialize for Source {
     }
 }
 
+/// A C compiler.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum CCompiler {
+    /// GNU's.
+    Gcc,
+    /// LLVM's.
+    Clang,
+}
+
+impl CCompiler {
+    /// All compilers.
+    pub const ALL: [Self; 2] = [Self::Gcc, Self::Clang];
+}
+
+impl Display for CCompiler {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Gcc => "gcc",
+            Self::Clang => "clang",
+        })
+    }
+}
+
 /// A routine and the loop that runs it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Contender {
@@ -70,6 +93,10 @@ pub enum Contender {
     SymPy,
     /// C printed by CasADi.
     CasADi,
+    /// Generated C, one element at a time.
+    GeneratedC(CCompiler),
+    /// Generated C in vectors of elements: the same work as batches.
+    GeneratedCBatches(CCompiler),
     /// Generated batches at the best level: points gathered, results transposed to one element after the other.
     Batches,
     /// Assembly by `energy-solve`: vertices in, block matrix out.
@@ -96,6 +123,8 @@ impl Display for Contender {
             Self::Dual => write!(f, "num-dual"),
             Self::SymPy => write!(f, "SymPy, C"),
             Self::CasADi => write!(f, "CasADi, C"),
+            Self::GeneratedC(compiler) => write!(f, "generated, C, {compiler}"),
+            Self::GeneratedCBatches(compiler) => write!(f, "generated, C in vectors, {compiler}"),
             Self::Batches => write!(f, "generated, batches"),
             Self::System => write!(f, "generated, assembled"),
             Self::ScatterOnly => write!(f, "scatter only"),

@@ -8,6 +8,7 @@ mod contender;
 pub mod contenders;
 mod dual;
 pub mod formulas;
+mod generated_c;
 pub mod kernels;
 pub mod measure;
 pub mod near_rest;
@@ -24,7 +25,7 @@ mod vector;
 mod work;
 
 pub use assembled::Assembled;
-pub use contender::Source;
+pub use contender::{CCompiler, Source};
 pub use dual::Dual;
 pub use random::Random;
 pub use report::{KEYS, Options, Report, benchmark, write_inputs};

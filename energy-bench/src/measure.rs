@@ -1,6 +1,6 @@
 //! Times of contenders. They run in turns, so that other load on the machine affects all of them equally.
 
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use energy_dsl::OperationCount;
 use serde::Serialize;
@@ -87,13 +87,28 @@ impl Measured {
     }
 }
 
+/// Runs all elements once to warm up, as the other contenders have filled the caches, and then again. Returns the time of
+/// the second run.
+pub type Timed = Box<dyn FnMut() -> Duration>;
+
+/// Times work of this program.
+#[must_use]
+pub fn timed(mut work: Work) -> Timed {
+    Box::new(move || {
+        work();
+        let start = Instant::now();
+        work();
+        start.elapsed()
+    })
+}
+
 /// Runs all contenders in turns, `repetitions` times, and calls `progress` after each turn. `elements` is the number of
 /// elements of one run.
 ///
 /// # Panics
 /// Panics if `repetitions` is 0.
 pub fn measure(
-    contenders: &mut [(Contender, Work)],
+    contenders: &mut [(Contender, Timed)],
     elements: usize,
     repetitions: usize,
     mut progress: impl FnMut(),
@@ -101,12 +116,8 @@ pub fn measure(
     assert!(repetitions > 0, "expected at least one repetition, got 0");
     let mut times = vec![Vec::with_capacity(repetitions); contenders.len()];
     for _ in 0..repetitions {
-        for ((_, work), times) in contenders.iter_mut().zip(&mut times) {
-            // Warm up: the other contenders have filled the caches.
-            work();
-            let start = Instant::now();
-            work();
-            times.push(start.elapsed().as_secs_f64() * 1e9 / elements as f64);
+        for ((_, run), times) in contenders.iter_mut().zip(&mut times) {
+            times.push(run().as_secs_f64() * 1e9 / elements as f64);
         }
         progress();
     }
@@ -114,7 +125,7 @@ pub fn measure(
         times.sort_by(f64::total_cmp);
         (times[times.len() / 2], times[0])
     });
-    let time = |((contender, _), (nanoseconds, least)): (&(Contender, Work), _)| Time {
+    let time = |((contender, _), (nanoseconds, least)): (&(Contender, Timed), _)| Time {
         contender: *contender,
         nanoseconds,
         least,

@@ -8,9 +8,11 @@ use energy_dsl::available;
 use serde::Serialize;
 
 use crate::agreement::{agreement, expected};
+use crate::contender::CCompiler;
 use crate::contenders::contenders;
 use crate::for_each_kernel;
-use crate::measure::{Measured, measure};
+use crate::generated_c;
+use crate::measure::{Measured, measure, timed};
 use crate::near_rest::NearRest;
 use crate::sample::Coincident;
 use crate::sample::Sample;
@@ -31,7 +33,9 @@ pub struct Options {
     pub kernels: Vec<String>,
     /// Python interpreter for the contenders in C; they are left out if `None`.
     pub python: Option<PathBuf>,
-    /// Folder that keeps the script's inputs; a temporary folder if `None`.
+    /// Commands of C compilers that build generated C.
+    pub c_compilers: Vec<(CCompiler, String)>,
+    /// Folder that keeps the inputs of scripts, and generated C with its programs; a temporary folder if `None`.
     pub inputs: Option<PathBuf>,
 }
 
@@ -134,6 +138,9 @@ pub fn benchmark(options: &Options) -> anyhow::Result<Report> {
         };
     }
     for_each_kernel!(run);
+    if options.c_compilers.is_empty() {
+        report.notes.push("generated C was not measured: pass --gcc or --clang with a command of theirs".to_owned());
+    }
     match &options.python {
         Some(python) => add_script(options, python, &cases, &mut report)?,
         None => report.notes.push(format!(
@@ -153,8 +160,16 @@ fn run_kernel<K: Subject>(options: &Options, case: &Case) -> anyhow::Result<Meas
     measured.coincident = case.coincident.verdicts::<K>();
     bar.inc(1);
     bar.set_message("timing");
-    let mut contenders = contenders::<K>(&case.samples);
+    let in_rust = contenders::<K>(&case.samples).into_iter();
+    let mut contenders: Vec<_> = in_rust.map(|(contender, work)| (contender, timed(work))).collect();
+    let temporary = std::env::temp_dir().join(format!("energy-bench-c-{}", std::process::id()));
+    for (compiler, command) in &options.c_compilers {
+        let folder = options.inputs.as_ref().unwrap_or(&temporary).join(format!("{}-{compiler}", K::KEY));
+        let results = (&*case.samples, &*case.expected);
+        contenders.extend(generated_c::contenders(K::DECLARATION, (*compiler, command), results, &folder)?);
+    }
     measured.times = measure(&mut contenders, case.samples.len(), options.repetitions, || bar.inc(1));
+    let _ = std::fs::remove_dir_all(temporary);
     bar.finish_and_clear();
     Ok(measured)
 }

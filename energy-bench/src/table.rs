@@ -1,7 +1,7 @@
 use comfy_table::{CellAlignment, Table, presets};
 use energy_dsl::LevelName;
 
-use crate::contender::{Contender, Source};
+use crate::contender::{CCompiler, Contender, Source};
 use crate::measure::Measured;
 use crate::readme::roundoffs;
 
@@ -51,6 +51,9 @@ fn times(rows: &mut Rows<'_>) {
     for contender in [Contender::Dual, Contender::SymPy, Contender::CasADi] {
         rows.time(contender);
     }
+    for contender in [Contender::GeneratedC, Contender::GeneratedCBatches] {
+        CCompiler::ALL.into_iter().for_each(|compiler| rows.time(contender(compiler)));
+    }
     for contender in [Contender::Batches, Contender::ScatterOnly, Contender::System, Contender::Clamped] {
         rows.time(contender);
     }
@@ -85,6 +88,14 @@ fn ratios_to_generated(rows: &mut Rows<'_>) {
     for contender in [Contender::Dual, Contender::SymPy, Contender::CasADi] {
         rows.ratio(&format!("{contender}/generated, scalar"), |kernel| {
             Some(kernel.time(contender)? / generated_scalar(kernel)?)
+        });
+    }
+    for compiler in CCompiler::ALL {
+        rows.ratio(&format!("C/generated, scalar, {compiler}"), |kernel| {
+            Some(kernel.time(Contender::GeneratedC(compiler))? / generated_scalar(kernel)?)
+        });
+        rows.ratio(&format!("C in vectors/batches, {compiler}"), |kernel| {
+            Some(kernel.time(Contender::GeneratedCBatches(compiler))? / kernel.time(Contender::Batches)?)
         });
     }
     let lanes = |kernel: &Measured| kernel.best(|contender| matches!(contender, Contender::GeneratedLanes(_)));

@@ -7,6 +7,7 @@ mod c_mixed;
 mod command_line;
 mod cover;
 mod elements;
+mod embedded;
 mod errata;
 mod fusion_reference;
 mod multiprecision;

@@ -16,12 +16,14 @@ use super::cover::sufficient;
 pub struct Compiler {
     command: Vec<String>,
     level: &'static str,
+    /// What runs programs of another processor.
+    runner: Option<&'static str>,
 }
 
 impl Compiler {
     /// Splits a command at its spaces.
     pub fn new(command: &str) -> Self {
-        Self { command: command.split_whitespace().map(str::to_owned).collect(), level: "-O1" }
+        Self { command: command.split_whitespace().map(str::to_owned).collect(), level: "-O1", runner: None }
     }
 
     /// Compiles fast. Numbers do not depend on the level of optimisation.
@@ -35,9 +37,14 @@ impl Compiler {
         Self::new(&format!("{command} -std=c99 -march=native"))
     }
 
+    /// Returns gcc for aarch64, whose programs an emulator runs.
+    pub fn aarch64() -> Self {
+        Self { runner: Some("qemu-aarch64"), ..Self::new("aarch64-linux-gnu-gcc -std=c99 -static") }
+    }
+
     fn exists(&self) -> bool {
         let version = Command::new(&self.command[0]).args(&self.command[1..]).arg("--version").output();
-        version.is_ok_and(|output| output.status.success())
+        version.is_ok_and(|output| output.status.success()) && self.runner.is_none_or(exists)
     }
 }
 
@@ -325,7 +332,7 @@ impl<S: Bits> Suite<S> {
 /// Compares all elements of a suite; `None` without this compiler.
 pub fn check<S: Bits>(compiler: &Compiler, name: &str, suite: impl FnOnce() -> Suite<S>) -> Option<Counts> {
     if !compiler.exists() {
-        println!("skipped: there is no {}", compiler.command[0]);
+        println!("skipped: there is no {} {}", compiler.command[0], compiler.runner.unwrap_or_default());
         return None;
     }
     if energy_dsl::level() == energy_dsl::LevelName::Baseline && cfg!(target_arch = "x86_64") {
@@ -337,7 +344,11 @@ pub fn check<S: Bits>(compiler: &Compiler, name: &str, suite: impl FnOnce() -> S
     let program = compiled(compiler, &elements, S::PRECISION, &folder);
     let records = folder.join("records");
     std::fs::write(&records, cases.iter().flat_map(Case::bytes).collect::<Vec<u8>>()).unwrap();
-    let output = Command::new(program).arg(&records).output().unwrap();
+    let output = match compiler.runner {
+        Some(runner) => Command::new(runner).arg(program).arg(&records).output(),
+        None => Command::new(program).arg(&records).output(),
+    };
+    let output = output.unwrap();
     assert!(output.status.success(), "{}", output.status);
     let counts = compare(&elements, &plain, &cases, &output.stdout);
     println!("{name}: {} inputs, {counts:?}", cases.len());
@@ -360,6 +371,12 @@ fn c_in_single_precision_has_the_bits_of_rust() {
 #[test]
 fn c_by_clang_has_the_bits_of_rust() {
     check::<f64>(&Compiler::clang(), "c-clang-f64", || Suite::of_points().sufficient());
+}
+
+#[test]
+fn c_for_aarch64_has_the_bits_of_rust() {
+    check::<f64>(&Compiler::aarch64(), "c-aarch64-f64", || Suite::of_points().sufficient());
+    check::<f32>(&Compiler::aarch64(), "c-aarch64-f32", || Suite::of_points().sufficient());
 }
 
 /// Projected Hessians are the nearest positive semi-definite matrices: Q max(Λ, 0) Qᵀ of nalgebra's decomposition.

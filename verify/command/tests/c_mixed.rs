@@ -49,6 +49,11 @@ fn c_by_clang_has_the_bits_of_rust() {
     check::<f64>(&Compiler::clang().unoptimised(), "c-mixed-clang-f64", || suite().sufficient());
 }
 
+#[test]
+fn c_for_aarch64_has_the_bits_of_rust() {
+    check::<f64>(&Compiler::aarch64().unoptimised(), "c-mixed-aarch64-f64", || suite().sufficient());
+}
+
 /// Elements whose loops are compared: of each kind of declaration and of unknowns, with and without a state.
 const LOOPS: [&str; 12] = [
     "ChainOfAngles",

@@ -2,12 +2,35 @@
    whose results the scalar function must compute. */
 typedef uint32_t @lanes_run(int32_t routine, const @lanes *const *arguments, @lanes *const *results);
 
+/* Loads rows of `count` numbers each, which are `stride` apart, as vectors. */
+ENERGY_FN void @lanes_load_all(const @real *rows, size_t stride, int32_t count, @lanes *numbers) {
+    int32_t j;
+    if (count < @LANES) {
+        for (j = 0; j < count; j++) {
+            numbers[j] = @lanes_strided(rows + j, stride);
+        }
+        return;
+    }
+    for (j = 0; j + @LANES <= count; j += @LANES) {
+        @lanes_load_rows(rows + j, stride, numbers + j);
+    }
+    /* The last square covers numbers again. */
+    if (j < count) {
+        @lanes_load_rows(rows + (count - @LANES), stride, numbers + (count - @LANES));
+    }
+}
+
 /* Reads the inputs of as many elements as there are lanes. */
 ENERGY_FN void @lanes_read(const @column *from, size_t first, int32_t count, @lanes *numbers) {
+    const @real *place = from->numbers + first * from->per_element;
     int32_t j;
+    if (from->per_number == 1U && from->per_element != 1U) {
+        @lanes_load_all(place, from->per_element, count, numbers);
+        return;
+    }
     for (j = 0; j < count; j++) {
-        const @real *place = from->numbers + first * from->per_element + (size_t)j * from->per_number;
         numbers[j] = from->per_element == 1U ? @lanes_load(place) : @lanes_strided(place, from->per_element);
+        place += from->per_number;
     }
 }
 
@@ -30,10 +53,36 @@ ENERGY_FN void @lanes_read_points(const @batch *batch, const @column *from, size
     }
 }
 
+/* Copies less than sixteen numbers. Compilers would call a function for lengths that they do not know. */
+ENERGY_FN void @copy_few(const @real *from, int32_t count, @real *to) {
+    int32_t j = 0;
+    if ((count & 8) != 0) {
+        memcpy(to, from, 8 * sizeof *to);
+        j = 8;
+    }
+    if ((count & 4) != 0) {
+        memcpy(to + j, from + j, 4 * sizeof *to);
+        j += 4;
+    }
+    if ((count & 2) != 0) {
+        memcpy(to + j, from + j, 2 * sizeof *to);
+        j += 2;
+    }
+    if ((count & 1) != 0) {
+        to[j] = from[j];
+    }
+}
+
 /* Stores vectors as rows of `count` numbers each, which are `stride` apart. */
 ENERGY_FN void @lanes_store_all(const @lanes *numbers, int32_t count, @real *rows, size_t stride) {
-    int32_t j;
-    if (count >= @LANES) {
+    int32_t j, lane;
+    if (count < 3) {
+        for (j = 0; j < count; j++) {
+            for (lane = 0; lane < @LANES; lane++) {
+                rows[(size_t)lane * stride + (size_t)j] = numbers[j][lane];
+            }
+        }
+    } else if (count >= @LANES) {
         for (j = 0; j + @LANES <= count; j += @LANES) {
             @lanes_store_rows(numbers + j, rows + j, stride);
         }
@@ -49,7 +98,7 @@ ENERGY_FN void @lanes_store_all(const @lanes *numbers, int32_t count, @real *row
         }
         @lanes_store_rows(square, all, @LANES);
         for (j = 0; j < @LANES; j++) {
-            memcpy(rows + (size_t)j * stride, all + j * @LANES, (size_t)count * sizeof *rows);
+            @copy_few(all + j * @LANES, count, rows + (size_t)j * stride);
         }
     }
 }
@@ -64,12 +113,12 @@ ENERGY_FN void @lanes_write(const @result *to, size_t first, int32_t count, int3
         return;
     }
     place = to->numbers + first * to->per_element;
-    if (to->layout == ENERGY_AS_RETURNED && to->per_number == 1U && count > 1) {
-        @lanes_store_all(numbers, count, place, to->per_element);
-    } else if (to->layout == ENERGY_AS_RETURNED && to->per_element == 1U) {
+    if (to->layout == ENERGY_AS_RETURNED && to->per_element == 1U) {
         for (j = 0; j < count; j++) {
             @lanes_store(numbers[j], place + (size_t)j * to->per_number);
         }
+    } else if (to->layout == ENERGY_AS_RETURNED && to->per_number == 1U) {
+        @lanes_store_all(numbers, count, place, to->per_element);
     } else {
         @real *rows = (@real *)(void *)spare;
         @lanes_store_all(numbers, count, rows, (size_t)count);

@@ -88,8 +88,11 @@ impl Element<'_> {
             ),
             true => (
                 "_lanes",
-                format!("    energy_{suffix}_lanes work[{room}];\n    {real} single[{room}];\n"),
-                format!("mixed_run_lanes(&{name}, &layout, {name}_lanes_run, routine, batch, work, single)"),
+                format!("    energy_{suffix}_lanes work[{}];\n    {real} single[{room}];\n", 2 * room),
+                format!(
+                    "mixed_run_lanes(&{name}, &layout, {name}_lanes_run, routine, batch, work, ({real} *)(void \
+                     *)(work + {room}), single)"
+                ),
             ),
         };
         format!(

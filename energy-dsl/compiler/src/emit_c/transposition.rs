@@ -28,7 +28,8 @@ fn gathers(lanes: usize) -> String {
     )
 }
 
-/// Writes the transposition by Eklundh's method: with step s, rows i and i + s exchange the columns whose index has, or
+/// Writes the functions that load a square of rows, which are `stride` apart, as vectors, and that store vectors as such
+/// rows. Both transpose by Eklundh's method: with step s, rows i and i + s exchange the columns whose index has, or
 /// lacks, the bit s.
 fn transposition(lanes: usize) -> String {
     let steps: Vec<usize> = std::iter::successors(Some(1), |step| Some(2 * step)).take_while(|&s| s < lanes).collect();
@@ -44,13 +45,34 @@ fn transposition(lanes: usize) -> String {
         text.push_str(&shuffle("low", &|lane| if lane & step == 0 { lane } else { lanes + lane - step }));
         text.push_str(&shuffle("high", &|lane| if lane & step == 0 { lane + step } else { lanes + lane }));
     }
-    text.push_str(
-        "/* Stores as many vectors as there are lanes as rows, which are `stride` apart. */\nENERGY_FN void \
-         @lanes_store_rows(const @lanes *numbers, @real *rows, size_t stride) {\n",
+    let last = letter(steps.len());
+    let load = |row| format!("@lanes_load(rows + {row} * stride)");
+    let store = |row| format!("@lanes_store({last}{row}, rows + {row} * stride);");
+    let network = network(lanes, &steps);
+    let mut function = |signature: &str, from: &dyn Fn(usize) -> String, to: &dyn Fn(usize) -> String| {
+        let _ = writeln!(text, "ENERGY_FN void {signature} {{");
+        for row in 0..lanes {
+            let _ = writeln!(text, "    const @lanes a{row} = {};", from(row));
+        }
+        text.push_str(&network);
+        for row in 0..lanes {
+            let _ = writeln!(text, "    {}", to(row));
+        }
+        text.push_str("}\n\n");
+    };
+    function("@lanes_load_rows(const @real *rows, size_t stride, @lanes *numbers)", &load, &|row| {
+        format!("numbers[{row}] = {last}{row};")
+    });
+    function(
+        "@lanes_store_rows(const @lanes *numbers, @real *rows, size_t stride)",
+        &|row| format!("numbers[{row}]"),
+        &store,
     );
-    for row in 0..lanes {
-        let _ = writeln!(text, "    const @lanes a{row} = numbers[{row}];");
-    }
+    text
+}
+
+fn network(lanes: usize, steps: &[usize]) -> String {
+    let mut text = String::new();
     for (stage, &step) in steps.iter().enumerate() {
         let (from, to) = (letter(stage), letter(stage + 1));
         for row in (0..lanes).filter(|row| row & step == 0) {
@@ -63,10 +85,7 @@ fn transposition(lanes: usize) -> String {
             }
         }
     }
-    for row in 0..lanes {
-        let _ = writeln!(text, "    @lanes_store({}{row}, rows + {row} * stride);", letter(steps.len()));
-    }
-    text + "}\n\n"
+    text
 }
 
 fn letter(stage: usize) -> char {
