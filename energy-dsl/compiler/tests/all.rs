@@ -4,6 +4,7 @@
 mod golden;
 mod growth;
 mod language;
+mod names;
 mod random;
 mod range;
 mod rest_parts;

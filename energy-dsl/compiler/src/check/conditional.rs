@@ -41,7 +41,7 @@ impl<'a> Checker<'a> {
         let kind = match shape {
             Shape::Truth => return self.error(span, format!("a branch must be a value, but it is {shape}")),
             Shape::Array(_) => {
-                let condition = match self.bind(condition, self.in_rest) {
+                let condition = match self.bind("", condition, self.in_rest) {
                     Meaning::Binding(number, shape) => {
                         Typed { kind: TypedKind::Binding(number), shape, span: span.clone() }
                     }

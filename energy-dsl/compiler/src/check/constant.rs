@@ -55,6 +55,7 @@ impl<'a> Checker<'a> {
         }
         let number = evaluate(&self.bindings, &value);
         self.bindings.push(Binding {
+            name: constant.name.text.clone(),
             value,
             rest: false,
             unit: Some(constant.unit.clone()),

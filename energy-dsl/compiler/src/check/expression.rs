@@ -165,7 +165,7 @@ impl<'a> Checker<'a> {
 
     pub(super) fn define(&mut self, name: &Name, value: Option<Typed>, rest: bool) {
         let value = value.and_then(|value| self.check_depth(value));
-        let meaning = value.map(|value| self.bind(value, rest));
+        let meaning = value.map(|value| self.bind(&name.text, value, rest));
         self.enter(name, meaning);
     }
 
@@ -175,14 +175,18 @@ impl<'a> Checker<'a> {
         self.scopes.last_mut().expect("compiler bug: no scope").insert(name.canonical(), meaning);
     }
 
-    pub(super) fn bind(&mut self, value: Typed, rest: bool) -> Meaning {
+    /// Keeps a value for its uses.
+    pub(super) fn bind(&mut self, name: &str, value: Typed, rest: bool) -> Meaning {
         let shape = value.shape;
         match value.kind {
-            TypedKind::Array(entries) => Meaning::Entries(entries.into_iter().map(|e| self.bind(e, rest)).collect()),
+            TypedKind::Array(entries) => {
+                let entries = entries.into_iter().enumerate();
+                Meaning::Entries(entries.map(|(i, entry)| self.bind(&format!("{name}[{i}]"), entry, rest)).collect())
+            }
             _ => {
                 let constant = super::constant::evaluate(&self.bindings, &value);
                 let depth = self.depth_of(&value);
-                self.bindings.push(Binding { value, rest, unit: None, constant, depth });
+                self.bindings.push(Binding { name: name.to_owned(), value, rest, unit: None, constant, depth });
                 Meaning::Binding(self.bindings.len() - 1, shape)
             }
         }

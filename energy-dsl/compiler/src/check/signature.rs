@@ -357,7 +357,8 @@ pub(super) fn shape_of(element: ElementType) -> Shape {
 
 /// Returns why a name would clash in the generated constructor; `None` if it would not.
 fn reserved(name: &str) -> Option<&'static str> {
-    let is_temporary = name.strip_prefix("__").is_some_and(|n| !n.is_empty() && n.bytes().all(|b| b.is_ascii_digit()));
+    let digits = |n: &str| !n.is_empty() && n.bytes().all(|b| b.is_ascii_digit());
+    let is_temporary = name.rsplit_once("__").is_some_and(|(_, number)| digits(number));
     if syn::parse_str::<syn::Ident>(name).is_err() {
         return Some("it is a word of Rust");
     }

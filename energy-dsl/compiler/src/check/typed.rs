@@ -186,6 +186,8 @@ pub struct Input {
 /// An intermediate value.
 #[derive(Clone, Debug)]
 pub struct Binding {
+    /// Its name in the formula, with the index of an entry of an array; empty for values without one.
+    pub name: String,
     /// Value of the binding.
     pub value: Typed,
     /// Whether the binding is in the `rest` block, and so computed once for each element.

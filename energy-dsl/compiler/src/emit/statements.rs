@@ -1,12 +1,12 @@
 //! Renders statements as Rust.
 
-use proc_macro2::{Literal, TokenStream};
+use proc_macro2::{Ident, Literal, TokenStream};
 use quote::{ToTokens, format_ident, quote};
 
 use super::Emitter;
 use super::spelling::Spellings;
 use crate::graph::{Input, NodeId, Op};
-use crate::plan::{Code, Shape};
+use crate::plan::{Code, Shape, Statements};
 
 /// Straight-line code as Rust.
 pub(super) struct Rendered {
@@ -29,7 +29,7 @@ impl Emitter<'_> {
         let is_computed = |&place: &usize| !matches!(list[place], Op::Input(_));
         let computed: Vec<usize> = (0..list.len()).filter(is_computed).collect();
         self.program.budget.spend(2 * computed.len() as u64, STATEMENT_BYTES * computed.len() as u64);
-        let names = Names::new(list, read);
+        let names = Names::new(&code.statements, read);
         if computed.len() <= 2 * BLOCK {
             return Rendered { statements: self.lets(list, &names, &computed), names };
         }
@@ -82,20 +82,29 @@ pub(super) fn arranged(shape: Shape, numbers: &[TokenStream]) -> TokenStream {
     quote!([#(#entries),*])
 }
 
+/// Returns the variable of a number that has a name in the formula: `F01__12` for `F[0][1]`. `None` if the name has
+/// characters that Rust does not allow.
+fn variable(number: usize, name: &str) -> Option<Ident> {
+    let text: String = name.chars().filter(|c| !matches!(c, '[' | ']')).collect();
+    syn::parse_str(&format!("{text}__{number}")).ok()
+}
+
 /// The expression of each statement's result: a variable, or an input.
 struct Names(Vec<TokenStream>);
 
 impl Names {
-    fn new(list: &[Op], read: &mut dyn FnMut(Input) -> TokenStream) -> Self {
+    fn new(statements: &Statements, read: &mut dyn FnMut(Input) -> TokenStream) -> Self {
         let mut computed = 0..;
-        let name = |op: &Op| match *op {
+        let name = |(place, op): (usize, &Op)| match *op {
             Op::Input(input) => read(input),
             _ => {
-                let name = format_ident!("__{}", computed.next().unwrap_or(usize::MAX));
+                let number = computed.next().unwrap_or(usize::MAX);
+                let named = statements.name(place).and_then(|name| variable(number, name));
+                let name = named.unwrap_or_else(|| format_ident!("__{number}"));
                 quote!(#name)
             }
         };
-        Self(list.iter().map(name).collect())
+        Self(statements.list().iter().enumerate().map(name).collect())
     }
 
     fn of(&self, place: NodeId) -> &TokenStream {

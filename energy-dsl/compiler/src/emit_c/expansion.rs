@@ -34,7 +34,7 @@ impl Element<'_> {
             _ => unreachable!("compiler bug: an expansion reads derivatives"),
         };
         let mut written = Written::default();
-        self.statements(self.dialect, expansion.statements.list(), &read, &mut written, &mut text);
+        self.statements(self.dialect, &expansion.statements, &read, &mut written, &mut text);
         for name in ["reduced_gradient", "reduced_hessian"] {
             if !expansion.inputs().iter().any(|&input| read(input).starts_with(&format!("{name}["))) {
                 let _ = writeln!(text, "    (void){name};");

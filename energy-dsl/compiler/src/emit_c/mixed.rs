@@ -64,7 +64,7 @@ impl Element<'_> {
         );
         let mut written = Written::default();
         let read = |input| self.read(input, false);
-        self.statements(self.dialect, code.statements.list(), &read, &mut written, &mut text);
+        self.statements(self.dialect, &code.statements, &read, &mut written, &mut text);
         for array in ["rest", "parameters"] {
             if !code.inputs().into_iter().any(|input| read(input).starts_with(&format!("{array}["))) {
                 let _ = writeln!(text, "    (void){array};");

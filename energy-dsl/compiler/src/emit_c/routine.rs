@@ -7,7 +7,7 @@ use super::element::Element;
 use super::expression::statement;
 use super::function::Function;
 use crate::graph::{Input, NodeId, Op};
-use crate::plan::{Code, RoutinePlan};
+use crate::plan::{Code, RoutinePlan, Statements};
 use energy_runtime::RoutineKind;
 
 /// Statements of a reduced Hessian that is written into the Hessian, too: its results then stay in registers until they
@@ -99,7 +99,7 @@ impl Element<'_> {
         let mut text = format!("{inlined} {returned} {name}({signature}) {{\n");
         let mut written = Written::default();
         let read = |input| self.read(input, *is_term);
-        self.statements(self.dialect, code.statements.list(), &read, &mut written, &mut text);
+        self.statements(self.dialect, &code.statements, &read, &mut written, &mut text);
         self.unused(function, *is_term, &code.inputs(), body.passes_on, &mut text);
         if let (Some(guard), Some(otherwise)) = (code.guard, &body.otherwise) {
             let _ = writeln!(text, "    if (!{}) {{\n        return {otherwise};\n    }}", written.name(guard));
@@ -167,19 +167,20 @@ impl Element<'_> {
     pub(super) fn statements(
         &self,
         dialect: Dialect,
-        list: &[Op],
+        statements: &Statements,
         read: &dyn Fn(Input) -> String,
         written: &mut Written,
         text: &mut String,
     ) {
-        for &op in list {
+        for (place, &op) in statements.list().iter().enumerate() {
             let name = match (op, statement(dialect, self.meanings, op, |place| written.name(place))) {
                 (Op::Input(input), _) => read(input),
                 (Op::Constant(_) | Op::Pi | Op::Truth(_), Some(value)) => value,
                 (_, Some(value)) => {
                     let name = format!("t{}", written.variables);
                     written.variables += 1;
-                    let _ = writeln!(text, "    const {} {name} = {value};", dialect.of_type(op.is_mask()));
+                    let comment = statements.name(place).map_or_else(String::new, |name| format!(" /* {name} */"));
+                    let _ = writeln!(text, "    const {} {name} = {value};{comment}", dialect.of_type(op.is_mask()));
                     name
                 }
                 (_, None) => unreachable!("compiler bug: only inputs are read in place"),

@@ -42,6 +42,17 @@ impl Shape {
             Self::Array(n) | Self::Rows(n) => usize::from(n),
         }
     }
+
+    /// Returns the index of each number, as formulas write it: nothing, `[i]`, or `[row][column]`.
+    pub(crate) fn indices(self) -> Vec<String> {
+        match self {
+            Self::Scalar | Self::Truth => vec![String::new()],
+            Self::Matrix(rows, columns) => {
+                (0..rows).flat_map(|row| (0..columns).map(move |column| format!("[{row}][{column}]"))).collect()
+            }
+            _ => (0..self.size()).map(|i| format!("[{i}]")).collect(),
+        }
+    }
 }
 
 impl fmt::Display for Shape {

@@ -37,6 +37,7 @@ pub(crate) use spectrum::{Dependence, Spectrum};
 pub(crate) use substitute::Substitution;
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
 
 use crate::budget::{Budget, Limits};
 
@@ -91,6 +92,8 @@ pub struct Graph {
     whole_powers: FxHashMap<(NodeId, u32), NodeId>,
     /// The forms in which rules are differentiated.
     derivative_forms: DerivativeForms,
+    /// Names that the formula gives to numbers.
+    names: FxHashMap<NodeId, Arc<str>>,
     /// Pays for nodes and for passes over them.
     budget: Budget,
 }
@@ -132,6 +135,7 @@ impl Graph {
             powers: FxHashMap::default(),
             whole_powers: FxHashMap::default(),
             derivative_forms: DerivativeForms::default(),
+            names: FxHashMap::default(),
             budget: Budget::new(Limits::NONE),
         }
     }
@@ -235,6 +239,24 @@ impl Graph {
             Op::Rule(id) => Some(&self.rules[id as usize]),
             _ => None,
         }
+    }
+
+    /// Names a number for readers of the code. A number that has a name keeps it.
+    pub(crate) fn name(&mut self, node: NodeId, name: &str) {
+        let node = self.resolve(node);
+        self.names.entry(node).or_insert_with(|| name.into());
+    }
+
+    /// Names what a number has become.
+    fn keep_name(&mut self, of: NodeId, copy: NodeId) {
+        if let Some(name) = self.names.get(&of).map(Arc::clone) {
+            self.names.entry(copy).or_insert(name);
+        }
+    }
+
+    /// Returns the names of numbers that rules do not replace.
+    pub(crate) fn names(&self) -> &FxHashMap<NodeId, Arc<str>> {
+        &self.names
     }
 
     /// Returns the node that computes the value: the rule's expression, or the node itself.

@@ -96,7 +96,10 @@ impl Path {
                 self.guards.insert(assumption.guard);
                 let instead = g.resolve(assumption.instead);
                 match self.done.get(&instead) {
-                    Some(&instead) => _ = self.done.insert(next, instead),
+                    Some(&instead) => {
+                        g.keep_name(next, instead);
+                        self.done.insert(next, instead);
+                    }
                     None => stack.push(instead),
                 }
                 continue;
@@ -106,6 +109,7 @@ impl Path {
             if missing.is_empty() {
                 g.budget().spend(1, 0);
                 let rebuilt = self.simplify(g, next);
+                g.keep_name(next, rebuilt);
                 self.done.insert(next, rebuilt);
                 stack.pop();
             } else {

@@ -269,6 +269,11 @@ impl<'a> Lowering<'a> {
         budget.note(number, operations - self.nested);
         self.nested = outer + operations;
         budget.at_binding(within);
+        if !binding.name.is_empty() {
+            for (&part, index) in value.parts.iter().zip(value.shape.indices()) {
+                self.graph.name(part, &format!("{}{index}", binding.name));
+            }
+        }
         self.done.insert(number, value.clone());
         value
     }

@@ -254,7 +254,7 @@ impl<'a> Unifier<'a> {
     }
 
     fn add(&mut self, value: Typed, rest: bool) -> usize {
-        self.bindings.push(Binding { value, rest, unit: None, constant: None, depth: 0 });
+        self.bindings.push(Binding { name: String::new(), value, rest, unit: None, constant: None, depth: 0 });
         self.bindings.len() - 1
     }
 }

@@ -140,7 +140,14 @@ impl<'a> Mover<'a> {
         let next = self.program.bindings.len() + self.moved.len();
         let number = *self.known.entry(parts).or_insert(next);
         if number == next {
-            self.moved.push(Binding { value: typed.clone(), rest: true, unit: None, constant: None, depth: 0 });
+            self.moved.push(Binding {
+                name: String::new(),
+                value: typed.clone(),
+                rest: true,
+                unit: None,
+                constant: None,
+                depth: 0,
+            });
         }
         Some(number)
     }

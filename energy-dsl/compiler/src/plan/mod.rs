@@ -10,7 +10,7 @@ mod statements;
 pub(crate) use description::operations;
 pub(crate) use groups::{Shape, groups};
 pub(crate) use routine::{GeneralPlan, RoutinePlan};
-pub(crate) use statements::{Code, RETURNED};
+pub(crate) use statements::{Code, RETURNED, Statements};
 
 use std::sync::Arc;
 

@@ -36,7 +36,8 @@ impl Code {
     pub(super) fn in_precision(&self, round: fn(f64) -> f64) -> Self {
         let (statements, stands_for) = decided(self.statements.list(), round);
         let place = |at: NodeId| stands_for[at.0 as usize];
-        self.on(Statements::of(statements), place).without_unused()
+        let statements = Statements::of(statements).with_names(&self.statements, |at| Some(place(at)));
+        self.on(statements, place).without_unused()
     }
 
     /// Removes statements that no result needs.
@@ -55,7 +56,10 @@ impl Code {
             places[place] = NodeId(u32::try_from(kept.len()).expect("fewer than 2³² statements"));
             kept.push(op.with_operands(|at| places[at.0 as usize]));
         }
-        self.on(Statements::of(kept), |at| places[at.0 as usize])
+        let place = |at: NodeId| places[at.0 as usize];
+        let statements = Statements::of(kept);
+        let statements = statements.with_names(&self.statements, |at| needed[at.0 as usize].then(|| place(at)));
+        self.on(statements, place)
     }
 }
 

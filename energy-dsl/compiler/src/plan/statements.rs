@@ -1,5 +1,7 @@
 //! The statements of a routine in the order of execution.
 
+use std::sync::Arc;
+
 use rustc_hash::FxHashMap;
 
 use crate::graph::{Graph, Input, NodeId, Op};
@@ -8,11 +10,25 @@ use crate::graph::{Graph, Input, NodeId, Op};
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Statements {
     list: Vec<Op>,
+    /// Names that the formula gives to results of statements.
+    names: FxHashMap<NodeId, Arc<str>>,
 }
 
 impl Statements {
     pub(super) fn of(list: Vec<Op>) -> Self {
-        Self { list }
+        Self { list, names: FxHashMap::default() }
+    }
+
+    /// Takes the names of other statements, of which `place` tells the places here.
+    pub(super) fn with_names(mut self, of: &Self, place: impl Fn(NodeId) -> Option<NodeId>) -> Self {
+        self.names = of.names.iter().filter_map(|(&at, name)| Some((place(at)?, Arc::clone(name)))).collect();
+        self
+    }
+
+    /// Returns the name that the formula gives to the result of a statement.
+    pub(crate) fn name(&self, place: usize) -> Option<&str> {
+        let place = NodeId(u32::try_from(place).ok()?);
+        self.names.get(&place).map(|name| &**name)
     }
 
     /// Returns all statements. Those that read an input come just before their first use.
@@ -92,6 +108,7 @@ impl<'a> Sequence<'a> {
         let place = NodeId(u32::try_from(self.statements.list.len()).expect("fewer than 2³² statements"));
         self.places.insert(node, place);
         self.statements.list.push(op);
+        self.statements.names.extend(self.graph.names().get(&node).map(|name| (place, Arc::clone(name))));
     }
 }
 
