@@ -43,8 +43,8 @@ static void one_at_a_time(const double *numbers, size_t count) {
 
 /* Results of elements from `first` on, each after the other. Numbers that do not change are columns, as in the batches in
    Rust; points are gathered from vertices, if there are any. */
-static void in_vectors(const double *columns, const double *x, const uint32_t *stencils, size_t all, size_t first, size_t count,
-                       double *results) {
+static void in_vectors(const double *columns, const double *x, const uint32_t *stencils, size_t all, size_t first,
+                       size_t count, double *results) {
     energy_f64_batch batch;
     memset(&batch, 0, sizeof batch);
     batch.count = count;
@@ -70,7 +70,8 @@ static void in_vectors(const double *columns, const double *x, const uint32_t *s
 
 /* The work of the batches in Rust: points of a strip, in which consecutive elements share all but one, and results that
    stay in the cache. */
-static void batches(const double *columns, const double *numbers, const double *vertices, const uint32_t *stencils, size_t count) {
+static void batches(const double *columns, const double *numbers, const double *vertices, const uint32_t *stencils,
+                    size_t count) {
     static double results[TOGETHER * RESULTS];
     size_t i;
     for (i = 0; i < count; i += TOGETHER) {

@@ -88,8 +88,8 @@ impl Measured {
 }
 
 /// Runs all elements once to warm up, as the other contenders have filled the caches, and then again. Returns the time of
-/// the second run.
-pub type Timed = Box<dyn FnMut() -> Duration>;
+/// the second run; an error if a program of its own ended.
+pub type Timed = Box<dyn FnMut() -> anyhow::Result<Duration>>;
 
 /// Times work of this program.
 #[must_use]
@@ -98,12 +98,15 @@ pub fn timed(mut work: Work) -> Timed {
         work();
         let start = Instant::now();
         work();
-        start.elapsed()
+        Ok(start.elapsed())
     })
 }
 
 /// Runs all contenders in turns, `repetitions` times, and calls `progress` after each turn. `elements` is the number of
 /// elements of one run.
+///
+/// # Errors
+/// Fails if a contender does.
 ///
 /// # Panics
 /// Panics if `repetitions` is 0.
@@ -112,12 +115,12 @@ pub fn measure(
     elements: usize,
     repetitions: usize,
     mut progress: impl FnMut(),
-) -> Vec<Time> {
+) -> anyhow::Result<Vec<Time>> {
     assert!(repetitions > 0, "expected at least one repetition, got 0");
     let mut times = vec![Vec::with_capacity(repetitions); contenders.len()];
     for _ in 0..repetitions {
         for ((_, run), times) in contenders.iter_mut().zip(&mut times) {
-            times.push(run().as_secs_f64() * 1e9 / elements as f64);
+            times.push(run()?.as_secs_f64() * 1e9 / elements as f64);
         }
         progress();
     }
@@ -130,5 +133,5 @@ pub fn measure(
         nanoseconds,
         least,
     };
-    contenders.iter().zip(medians).map(time).collect()
+    Ok(contenders.iter().zip(medians).map(time).collect())
 }

@@ -168,7 +168,7 @@ fn run_kernel<K: Subject>(options: &Options, case: &Case) -> anyhow::Result<Meas
         let results = (&*case.samples, &*case.expected);
         contenders.extend(generated_c::contenders(K::DECLARATION, (*compiler, command), results, &folder)?);
     }
-    measured.times = measure(&mut contenders, case.samples.len(), options.repetitions, || bar.inc(1));
+    measured.times = measure(&mut contenders, case.samples.len(), options.repetitions, || bar.inc(1))?;
     let _ = std::fs::remove_dir_all(temporary);
     bar.finish_and_clear();
     Ok(measured)
