@@ -103,6 +103,22 @@ ENERGY_FN void @lanes_store_all(const @lanes *numbers, int32_t count, @real *row
     }
 }
 
+/* Asks for the cache lines of rows that will be written soon, if a row is longer than a few lines: rows that are written
+   side by side are no pattern that processors foresee. There may be no such rows; then nothing happens. */
+ENERGY_FN void @prefetch_rows(const @real *rows, int32_t count, size_t stride) {
+    const size_t line = 64U, bytes = (size_t)count * sizeof *rows;
+    size_t lane, byte;
+    if (bytes <= 2U * line) {
+        return;
+    }
+    for (lane = 0U; lane < @LANES; lane++) {
+        const uintptr_t row = (uintptr_t)rows + lane * stride * sizeof *rows;
+        for (byte = 0U; byte < bytes; byte += line) {
+            __builtin_prefetch((const void *)(row + byte), 1);
+        }
+    }
+}
+
 /* Writes a result of a vector of elements. `block` is the number of numbers that have a slot together; `spare` has room
    for the result. */
 ENERGY_FN void @lanes_write(const @result *to, size_t first, int32_t count, int32_t block, int32_t coordinates,
@@ -119,6 +135,7 @@ ENERGY_FN void @lanes_write(const @result *to, size_t first, int32_t count, int3
         }
     } else if (to->layout == ENERGY_AS_RETURNED && to->per_number == 1U) {
         @lanes_store_all(numbers, count, place, to->per_element);
+        @prefetch_rows((const @real *)((uintptr_t)place + @LANES * to->per_element * sizeof *place), count, to->per_element);
     } else {
         @real *rows = (@real *)(void *)spare;
         @lanes_store_all(numbers, count, rows, (size_t)count);

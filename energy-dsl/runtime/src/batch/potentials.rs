@@ -6,7 +6,7 @@ use super::error::{BatchError, Flagged, check_output, note_flags};
 use super::packed::{BLOCK, Packed, PackedPotential, WidePoints};
 use crate::array::Array;
 use crate::element::{Block, Potential, Vector3};
-use crate::numbers::{Float, Kernel, Lane, Level, Real, dispatch};
+use crate::numbers::{Float, Kernel, Lane, Level, Real, dispatch, prefetch_rows};
 
 /// One element per lane, with its points.
 pub struct Batch<'a, E: PackedPotential<S>, V: Lane<S>, S: Float = f64> {
@@ -266,5 +266,8 @@ impl<S: Float, E: PackedPotential<S>> BatchWork<E, S> for Hessians<'_, S> {
 #[inline(always)]
 pub(super) fn store_rows<S: Real, V: Lane<S>>(numbers: &[V], place: usize, count: usize, out: &mut [S]) {
     let stride = numbers.len();
-    V::store_transposed(numbers, count, &mut out[place * stride..], stride);
+    let out = &mut out[place * stride..];
+    V::store_transposed(numbers, count, out, stride);
+    let next = &out[count * stride..];
+    prefetch_rows(&next[..next.len().min(count * stride)], stride);
 }

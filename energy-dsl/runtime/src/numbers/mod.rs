@@ -23,7 +23,7 @@ mod trace;
 mod unbounded;
 
 pub use block_sum::{BLOCK_NUMBERS, BlockSum};
-pub(crate) use cpu::{Fused, read_alone};
+pub(crate) use cpu::{Fused, prefetch_rows, read_alone};
 pub use cpu::{LevelName, UnknownLevel, available, dispatch, dispatch_at, level};
 pub use flags::{Flag, Flags};
 pub use float::Float;

@@ -10,7 +10,7 @@ use super::runner::{Places, Runner};
 use super::slots::{Results, Slots};
 use crate::RoutineKind;
 use crate::batch::{BatchError, Flagged};
-use crate::numbers::{Flags, Float, Kernel, Lane, Level, Number, dispatch};
+use crate::numbers::{Flags, Float, Kernel, Lane, Level, Number, dispatch, prefetch_rows};
 
 /// The numbers of one group of results that a caller wants, element by element.
 #[derive(Debug)]
@@ -243,6 +243,8 @@ impl<S: Float> Kernel for StoreRows<'_, S> {
                 S::Lanes::<L>::store_transposed(&numbers[..layout.len()], together, rows, width);
             }
             first += lanes;
+            let next = rows.get(first * width..).unwrap_or_default();
+            prefetch_rows(&next[..next.len().min(lanes * width)], width);
         }
     }
 }

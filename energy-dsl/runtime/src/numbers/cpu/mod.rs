@@ -46,6 +46,21 @@ impl Level for Fused {
     type Sum32 = Rows<f32, Self>;
 }
 
+/// Asks for the cache lines of rows that will be written soon, if a row is longer than a few lines: rows that are written
+/// side by side are no pattern that processors foresee.
+#[inline(always)]
+pub(crate) fn prefetch_rows<S>(numbers: &[S], stride: usize) {
+    /// Bytes of a cache line.
+    const LINE: usize = 64;
+    if stride * size_of::<S>() <= 2 * LINE {
+        return;
+    }
+    #[cfg(target_arch = "x86_64")]
+    numbers.iter().step_by((LINE / size_of::<S>()).max(1)).for_each(x86::prefetch);
+    #[cfg(not(target_arch = "x86_64"))]
+    let _ = numbers;
+}
+
 /// The SIMD levels, in increasing order. A level includes the instructions of all lower ones.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[repr(u8)]
