@@ -6,6 +6,7 @@ mod c;
 mod c_mixed;
 mod command_line;
 mod cover;
+mod cuda_on_host;
 mod elements;
 mod embedded;
 mod errata;

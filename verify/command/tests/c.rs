@@ -302,7 +302,7 @@ pub struct Suite<S> {
 
 impl<S: Bits> Suite<S> {
     /// Returns all elements of points of the library, and all residuals.
-    fn of_points() -> Self {
+    pub fn of_points() -> Self {
         let all = catalogue::elements();
         let elements: Vec<Interpreted> = all.iter().map(|entry| interpreted(entry.declaration)).collect();
         let plain = |entry: &energy_dsl::AnyElement| {
@@ -444,17 +444,45 @@ fn projected_hessians_are_the_nearest_semi_definite_ones() {
     assert!(largest < 100.0, "{largest} u");
 }
 
+/// What is compared with single elements, beside loops over one element at a time.
+#[derive(Clone, Copy, PartialEq)]
+pub enum Loops {
+    /// Loops over vectors of elements.
+    InLanes,
+    /// Kernels of CUDA, which run on the host.
+    Kernels,
+}
+
+/// Returns a line of CUDA as C++, where it launches a kernel.
+fn launched_on_host(line: &str) -> String {
+    match line.trim().split_once("<<<blocks, threads, 0, stream>>>") {
+        Some((kernel, batch)) => {
+            format!("        run_on_host({kernel}, blocks, threads, stream, {}", batch.trim_start_matches('('))
+        }
+        None => line.to_owned(),
+    }
+}
+
+/// What compilers of C++ need to run generated CUDA.
+pub fn cuda_on_host() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/cuda_on_host.h")
+}
+
 /// Loops over elements, one at a time and in vectors, have the bits of single calls. Every fifth element suffices: the
 /// loops are the same for all.
 #[test]
 fn loops_have_the_bits_of_single_elements() {
-    loops::<f64>("loops-f64", 0);
-    loops::<f32>("loops-f32", 3);
+    loops::<f64>("loops-f64", 0, Loops::InLanes);
+    loops::<f32>("loops-f32", 3, Loops::InLanes);
 }
 
-fn loops<S: Bits>(name: &str, first: usize) {
-    if !exists("gcc") {
-        println!("skipped: there is no gcc");
+pub fn loops<S: Bits>(name: &str, first: usize, of: Loops) {
+    let command: &[&str] = match of {
+        Loops::InLanes => &["gcc", "-std=c99", "-march=native"],
+        Loops::Kernels => &["g++", "-std=c++17", "-march=native", "-x", "c++", "-Wno-unused-function", "-include"],
+    };
+    if !exists(command[0]) {
+        println!("skipped: there is no {}", command[0]);
         return;
     }
     let all = Suite::<S>::of_points();
@@ -466,11 +494,15 @@ fn loops<S: Bits>(name: &str, first: usize) {
     let (real, suffix) = (if S::PRECISION == Precision::Double { "double" } else { "float" }, S::PRECISION.name());
     let mut text = String::new();
     let mut names = Vec::new();
-    for file in sources(&elements, Target::C, &[S::PRECISION]).unwrap() {
-        std::fs::write(folder.join(&file.name), &file.text).unwrap();
-        if let Some(name) = file.name.strip_suffix(".c") {
+    let target = if of == Loops::Kernels { Target::Cuda } else { Target::C };
+    for file in sources(&elements, target, &[S::PRECISION]).unwrap() {
+        let lines: Vec<String> = file.text.lines().map(launched_on_host).collect();
+        std::fs::write(folder.join(&file.name), lines.join("\n") + "\n").unwrap();
+        let (stem, ending) = file.name.rsplit_once('.').unwrap_or_default();
+        let is_lanes = stem.ends_with("_lanes");
+        if ending == "cu" || ending == "c" && (of == Loops::InLanes || !is_lanes) {
             text.push_str(&format!("#include \"{}\"\n", file.name));
-            names.extend((!name.ends_with("_lanes")).then(|| name.to_owned()));
+            names.extend((ending == "c" && !is_lanes).then(|| stem.to_owned()));
         }
     }
     let list = |before: &str, after: &str| {
@@ -479,25 +511,25 @@ fn loops<S: Bits>(name: &str, first: usize) {
     text.push_str(&format!(
         "#define REAL {real}\n#define ELEMENT energy_{suffix}_element\n#define COLUMN energy_{suffix}_column\n#define BATCH \
          energy_{suffix}_batch\nstatic const ELEMENT *const elements[] = {{{}}};\ntypedef void loop(int32_t, BATCH \
-         *);\nstatic loop *const plain[] = {{{}}};\nstatic loop *const in_lanes[] = {{{}}};\n",
+         *);\nstatic loop *const plain[] = {{{}}};\n",
         list("&", ""),
         list("", "_evaluate"),
-        list("", "_evaluate_lanes")
     ));
+    let others = match of {
+        Loops::InLanes => list("", "_evaluate_lanes"),
+        Loops::Kernels => list("[](int32_t routine, BATCH *batch) { launched(", "_launch, routine, batch); }"),
+    };
+    text.push_str(&format!("static loop *const in_lanes[] = {{{others}}};\n"));
     std::fs::write(folder.join("elements.h"), text).unwrap();
     let program = folder.join("loops");
     let driver = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/loops.c");
-    let output = Command::new("gcc")
-        .args(["-std=c99", "-march=native"])
-        .args(OPTIONS)
-        .args(["-O0", "-I"])
-        .arg(&folder)
-        .arg(driver)
-        .arg("-o")
-        .arg(&program)
-        .arg("-lm")
-        .output()
-        .unwrap();
+    let mut compile = Command::new(command[0]);
+    compile.args(&command[1..]);
+    if of == Loops::Kernels {
+        compile.arg(cuda_on_host());
+    }
+    let output = compile.args(OPTIONS).args(["-O0", "-I"]).arg(&folder).arg(driver).arg("-o").arg(&program).arg("-lm");
+    let output = output.output().unwrap();
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     let output = Command::new(program).arg(&records).output().unwrap();
     let printed = String::from_utf8_lossy(&output.stdout);
