@@ -255,7 +255,16 @@ fn statements(body: &str) -> Vec<String> {
     if body.contains("#if") || body.contains("for (") || body.contains("memcpy") {
         return Vec::new();
     }
-    body.split(';').map(|statement| statement.trim().to_owned()).filter(|statement| !statement.is_empty()).collect()
+    let statements = without_comments(body);
+    let statements = statements.split(';').map(|statement| statement.trim().to_owned());
+    statements.filter(|statement| !statement.is_empty()).collect()
+}
+
+fn without_comments(text: &str) -> String {
+    text.split("/*")
+        .enumerate()
+        .map(|(i, part)| if i == 0 { part } else { part.split_once("*/").map_or("", |p| p.1) })
+        .collect()
 }
 
 /// A function of the shared header.
