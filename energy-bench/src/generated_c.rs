@@ -1,19 +1,19 @@
 //! Generated elements in C, built by C compilers of this machine. They run when it is their turn.
 
 use std::cell::RefCell;
-use std::io::{BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};
-use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
+use std::process::Command;
 use std::rc::Rc;
 use std::time::Duration;
 
-use anyhow::{Context, bail, ensure};
+use anyhow::{Context, ensure};
 use energy_compiler::{Budget, Interpreted, Precision, Target, sources};
 use energy_dsl::Declaration;
 
 use crate::contender::{CCompiler, Contender};
 use crate::measure::Timed;
 use crate::sample::Sample;
+use crate::served::Served;
 
 /// What runs an element, and answers commands on its standard input.
 const PROGRAM: &str = include_str!("generated_c.c");
@@ -89,12 +89,10 @@ fn build(
     Ok(folder.join("main"))
 }
 
-/// A running program. It ends when it is dropped.
+/// The running program.
 struct Process {
-    child: Child,
-    /// `None` only while it is dropped.
-    commands: Option<ChildStdin>,
-    answers: BufReader<ChildStdout>,
+    served: Served,
+    /// Where it writes results.
     outputs: PathBuf,
 }
 
@@ -104,28 +102,16 @@ impl Process {
         let numbers: Vec<u8> =
             samples.iter().flat_map(|sample| &sample.generated).flat_map(|number| number.to_le_bytes()).collect();
         energy_cli::write_file(&inputs, &numbers)?;
-        let mut child = Command::new(program)
-            .arg(samples.len().to_string())
-            .args([&inputs, &outputs])
-            .stdin(Stdio::piped())
-            .stdout(Stdio::piped())
-            .spawn()
-            .with_context(|| format!("cannot run {}", program.display()))?;
-        let (Some(commands), Some(answers)) = (child.stdin.take(), child.stdout.take()) else {
-            bail!("no pipes to {}", program.display());
-        };
-        let answers = BufReader::new(answers);
-        Ok(Self { child, commands: Some(commands), answers, outputs })
+        let mut command = Command::new(program);
+        command.arg(samples.len().to_string()).args([&inputs, &outputs]);
+        Ok(Self { served: Served::start("the program in C", &mut command)?, outputs })
     }
 
     /// Returns the time of a command.
     fn command(&mut self, command: &str) -> anyhow::Result<Duration> {
-        if let Some(commands) = &mut self.commands {
-            let _ = writeln!(commands, "{command}").and_then(|()| commands.flush());
-        }
-        let mut line = String::new();
-        self.answers.read_line(&mut line).context("the program in C cannot be read")?;
-        let nanoseconds: f64 = line.trim().parse().context("the program in C has ended")?;
+        let line = self.served.ask(command)?;
+        let nanoseconds: f64 =
+            line.trim().parse().with_context(|| format!("the program in C printed `{}`", line.trim()))?;
         Ok(Duration::from_secs_f64(nanoseconds * 1e-9))
     }
 
@@ -136,12 +122,5 @@ impl Process {
         ensure!(bytes.len() == elements * 2 * size * 8, "the program in C wrote {} bytes", bytes.len());
         let (numbers, _) = bytes.as_chunks::<8>();
         Ok(numbers.chunks(2 * size).map(|of_one| of_one.iter().copied().map(f64::from_le_bytes).collect()).collect())
-    }
-}
-
-impl Drop for Process {
-    fn drop(&mut self) {
-        self.commands = None;
-        let _ = self.child.wait();
     }
 }

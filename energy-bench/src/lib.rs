@@ -18,6 +18,7 @@ mod report;
 mod run;
 mod sample;
 mod script;
+mod served;
 mod subject;
 mod table;
 mod uncompensated;

@@ -1,23 +1,18 @@
 //! The programs by SymPy. A Python script builds them, and runs them when it is their turn.
 
 use std::collections::BTreeMap;
-use std::io::{BufRead, BufReader, Write};
 use std::path::Path;
-use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
+use std::process::Command;
 
-use anyhow::{Context, bail};
+use anyhow::Context;
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
 
 use super::Program;
+use crate::served::Served;
 
 /// The running script. It ends when it is dropped.
-pub(super) struct Script {
-    process: Child,
-    /// `None` only while it is dropped.
-    commands: Option<ChildStdin>,
-    answers: BufReader<ChildStdout>,
-}
+pub(super) struct Script(Served);
 
 #[derive(Deserialize)]
 struct Notes {
@@ -28,20 +23,11 @@ impl Script {
     /// Starts the script on a folder of inputs, and returns its notes about missing packages.
     pub fn start(python: &Path, inputs: &Path) -> anyhow::Result<(Self, Vec<String>)> {
         let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("scripts/symbolic_formulas.py");
-        let mut process = Command::new(python)
-            .arg(&script)
-            .arg(inputs)
-            .arg("--serve")
-            .stdin(Stdio::piped())
-            .stdout(Stdio::piped())
-            .spawn()
-            .with_context(|| format!("cannot run {}", python.display()))?;
-        let (Some(commands), Some(answers)) = (process.stdin.take(), process.stdout.take()) else {
-            bail!("no pipes to {}", python.display());
-        };
-        let mut script = Self { process, commands: Some(commands), answers: BufReader::new(answers) };
-        let Notes { notes } = script.answer()?;
-        Ok((script, notes))
+        let mut command = Command::new(python);
+        command.arg(&script).arg(inputs).arg("--serve");
+        let mut served = Served::start("scripts/symbolic_formulas.py", &mut command)?;
+        let Notes { notes } = read(&served.answer()?)?;
+        Ok((Self(served), notes))
     }
 
     /// Builds all programs for a formula and compares their results. Returns the seconds from the formula to each
@@ -56,27 +42,10 @@ impl Script {
     }
 
     fn command<T: DeserializeOwned>(&mut self, command: &str) -> anyhow::Result<T> {
-        // If the script has ended, its answer says so.
-        if let Some(commands) = &mut self.commands {
-            let _ = writeln!(commands, "{command}").and_then(|()| commands.flush());
-        }
-        self.answer()
-    }
-
-    fn answer<T: DeserializeOwned>(&mut self) -> anyhow::Result<T> {
-        let mut line = String::new();
-        self.answers.read_line(&mut line).context("the script cannot be read")?;
-        if line.is_empty() {
-            bail!("scripts/symbolic_formulas.py ended: {}; its message stands above", self.process.wait()?);
-        }
-        serde_json::from_str(&line).with_context(|| format!("the script printed `{}`", line.trim()))
+        read(&self.0.ask(command)?)
     }
 }
 
-impl Drop for Script {
-    fn drop(&mut self) {
-        // At the end of its commands, the script removes its files and ends.
-        self.commands = None;
-        let _ = self.process.wait();
-    }
+fn read<T: DeserializeOwned>(line: &str) -> anyhow::Result<T> {
+    serde_json::from_str(line).with_context(|| format!("the script printed `{}`", line.trim()))
 }
