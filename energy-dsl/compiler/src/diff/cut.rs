@@ -11,11 +11,11 @@ use super::forward::{self, Sparse};
 use super::linear_part::LinearPart;
 use super::local::Order;
 use super::outer_products::{AsTheyCome, Summation};
-use super::{differentiable, is_computed_otherwise, moving_operands};
-use crate::graph::{Graph, NodeId, Op, count, ordinary};
+use super::{differentiable, is_computed_otherwise, moving_operands, vertex_cut};
+use crate::graph::{Graph, NodeId, count, ordinary};
 
 /// The most nodes of a narrow cut.
-const NARROW: usize = 3;
+pub(super) const NARROW: usize = 3;
 
 /// Derivatives gathered at a cut.
 #[derive(Clone)]
@@ -33,6 +33,8 @@ pub(super) struct ByCut {
     known: BTreeMap<Vec<NodeId>, Gathered>,
     /// The last node of the formula, if common factors are taken out.
     factored: Option<NodeId>,
+    /// The width of cuts above a cut.
+    width: Width,
     /// Steps of the compiler after which no more cuts are looked for.
     last_step: u64,
 }
@@ -41,8 +43,8 @@ pub(super) struct ByCut {
 const STEPS: u64 = 2_000_000;
 
 impl ByCut {
-    pub(super) fn new(g: &Graph, factored: Option<NodeId>) -> Self {
-        Self { known: BTreeMap::new(), factored, last_step: g.budget().progress().steps.saturating_add(STEPS) }
+    pub(super) fn new(g: &Graph, factored: Option<NodeId>, width: Width) -> Self {
+        Self { known: BTreeMap::new(), factored, width, last_step: g.budget().progress().steps.saturating_add(STEPS) }
     }
 
     /// Returns whether there are steps left.
@@ -143,7 +145,7 @@ fn by_cut(g: &mut Graph, output: NodeId, cut: &[NodeId], known: &mut ByCut) -> G
         }
     };
     let is_nested = cut.len() >= NARROW || known.factored.is_some();
-    let mut waists = if is_nested { waists(g, output, &coordinates, Order::Second) } else { Vec::new() };
+    let mut waists = if is_nested { waists(g, output, &coordinates, Order::Second, known.width) } else { Vec::new() };
     if known.factored.is_some() && cut.len() >= NARROW {
         waists.extend(LinearPart::new(g, output, &coordinates, Order::Second).narrowest());
     }
@@ -234,6 +236,15 @@ impl<'a> Fronts<'a> {
     }
 }
 
+/// How many numbers a waist has, at most.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Width {
+    /// Fewer than there are coordinates.
+    Narrower,
+    /// As many as there are coordinates.
+    AsWide,
+}
+
 /// The most waists of a formula, but for the linear one.
 const MOST_WAISTS: usize = 5;
 /// The most products ∇c ∇cᵀ of a waist. More take long to write down.
@@ -242,9 +253,18 @@ const MOST_PRODUCTS: usize = 1_000_000;
 /// Returns the narrow parts of the graph between the coordinates and U: fronts that are narrower than all that are
 /// closer to the coordinates, and linear functions of the coordinates. Of many, it returns those of few nodes and the
 /// one that is closest to the coordinates.
-pub(super) fn waists(g: &Graph, output: NodeId, coordinates: &Coordinates, order: Order) -> Vec<Vec<NodeId>> {
-    // A function of one number may be one of another number.
-    let narrower = coordinates.len().saturating_sub(1).max(1);
+pub(super) fn waists(
+    g: &Graph,
+    output: NodeId,
+    coordinates: &Coordinates,
+    order: Order,
+    width: Width,
+) -> Vec<Vec<NodeId>> {
+    let narrower = match width {
+        // A function of one number may be one of another number.
+        Width::Narrower => coordinates.len().saturating_sub(1).max(1),
+        Width::AsWide => coordinates.len(),
+    };
     let widest = narrower.min(MOST_PRODUCTS / coordinates.len().pow(2).max(1));
     let mut fronts = Fronts::new(g, output, coordinates, order);
     let mut waists: Vec<Vec<NodeId>> = Vec::new();
@@ -263,42 +283,66 @@ pub(super) fn waists(g: &Graph, output: NodeId, coordinates: &Coordinates, order
     waists.into_iter().chain(linear).collect()
 }
 
-/// Returns the robust primitives that depend on no other one, if every path from the coordinates to U leads through
-/// them.
-pub(super) fn primitives(g: &Graph, output: NodeId, coordinates: &Coordinates) -> Option<Vec<NodeId>> {
-    let nodes = differentiable(g, &[output], Order::Second);
-    // Nodes that depend on some primitive.
-    let mut above: BTreeSet<NodeId> = BTreeSet::new();
-    let mut cut = Vec::new();
-    for &node in &nodes {
-        let (is_primitive, operands): (_, Vec<NodeId>) = match g.rule(node) {
-            _ if let Some(operand) = g.collapsed_to(node) => (false, vec![operand]),
-            Some(rule) if g.is_spelled_out(rule) => (false, vec![rule.value]),
-            Some(rule) if rule.second.is_some() => (true, rule.arguments.clone()),
-            Some(_) => return None,
-            None => (false, g.op(node).operands().collect()),
-        };
-        let fed = operands.iter().any(|o| above.contains(o));
-        if is_primitive && !fed {
-            cut.push(node);
+/// The robust primitives that depend on no other one.
+pub(super) struct Primitives {
+    /// The primitives.
+    lowest: BTreeSet<NodeId>,
+    /// The nodes by which paths from the coordinates to U lead around them.
+    around: BTreeSet<NodeId>,
+    /// What the coordinates reach without a primitive, and the primitives, each with its moving operands.
+    below: BTreeMap<NodeId, Vec<NodeId>>,
+}
+
+impl Primitives {
+    /// Finds the primitives of U. `None` if there are fewer than two, or one has no second derivatives.
+    pub(super) fn new(g: &Graph, output: NodeId, coordinates: &Coordinates) -> Option<Self> {
+        let nodes = differentiable(g, &[output], Order::Second);
+        // Nodes that depend on a coordinate, and on some primitive.
+        let (mut moving, mut above): (BTreeSet<NodeId>, BTreeSet<NodeId>) = Default::default();
+        let mut found = Self { lowest: BTreeSet::new(), around: BTreeSet::new(), below: BTreeMap::new() };
+        for &node in &nodes {
+            let is_coordinate = coordinates.seeds.contains_key(&node);
+            let mut operands = if is_coordinate { Vec::new() } else { moving_operands(g, node, Order::Second) };
+            operands.retain(|operand| moving.contains(operand));
+            if operands.is_empty() && !is_coordinate {
+                continue;
+            }
+            moving.insert(node);
+            let is_primitive = match g.rule(node) {
+                Some(rule) if g.collapsed_to(node).is_none() && !g.is_spelled_out(rule) => {
+                    rule.second.as_ref()?;
+                    true
+                }
+                _ => false,
+            };
+            let (fed, others): (Vec<NodeId>, _) = operands.iter().partition(|operand| above.contains(operand));
+            if fed.is_empty() {
+                found.below.insert(node, operands);
+                found.lowest.extend(is_primitive.then_some(node));
+            } else {
+                found.around.extend(others);
+            }
+            if is_primitive || !fed.is_empty() {
+                above.insert(node);
+            }
         }
-        if fed || is_primitive {
-            above.insert(node);
-        }
+        (found.lowest.len() > 1 && !found.lowest.contains(&output)).then_some(found)
     }
-    // A path around the primitives ends in a node above them that also reads a node below.
-    let bypassed = nodes.iter().filter(|&&node| above.contains(&node) && !cut.contains(&node)).any(|&node| {
-        let operands: Vec<NodeId> = match g.rule(node) {
-            _ if let Some(operand) = g.collapsed_to(node) => vec![operand],
-            Some(rule) if g.is_spelled_out(rule) => vec![rule.value],
-            Some(rule) => rule.arguments.clone(),
-            None => match g.op(node) {
-                Op::Select(_, yes, no) => vec![yes, no],
-                op => op.operands().collect(),
-            },
+
+    /// Returns the primitives, if all paths lead through them and they are not more than the coordinates.
+    pub(super) fn alone(&self, coordinates: &Coordinates) -> Option<Vec<NodeId>> {
+        let is_cut = self.around.is_empty() && self.lowest.len() <= coordinates.len();
+        is_cut.then(|| self.lowest.iter().copied().collect())
+    }
+
+    /// Returns the primitives with what leads around them, or the fewest nodes below if these are more than the
+    /// coordinates: the sine and the cosine of an angle give way to it.
+    pub(super) fn with_others(&self, coordinates: &Coordinates) -> Option<Vec<NodeId>> {
+        let all: BTreeSet<NodeId> = self.lowest.union(&self.around).copied().collect();
+        let cut = match all.len() <= coordinates.len() {
+            true => all.into_iter().collect(),
+            false => vertex_cut::narrowest(&all, &self.below),
         };
-        operands.into_iter().any(|o| g.varies(o) && !above.contains(&o))
-    });
-    let gains = cut.len() > 1 && cut.len() <= coordinates.len() && !cut.contains(&output);
-    (above.contains(&output) && !bypassed && gains).then_some(cut)
+        cut.iter().any(|node| !coordinates.seeds.contains_key(node)).then_some(cut)
+    }
 }

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::coordinates::Coordinates;
-use super::cut::ByCut;
+use super::cut::{ByCut, Primitives, Width};
 use super::factored::Factored;
 use super::linear_part::LinearPart;
 use super::local::Order;
@@ -115,9 +115,9 @@ fn choose(
 /// Steps of the compiler for the routes of a routine that may be given up.
 const STEPS: u64 = 2_000_000;
 
-/// Returns the first and second derivatives of a scalar by the cheapest route. Routes that are tried in a graph of their
-/// own must be shorter by a twentieth: what is not taken must not influence which products are fused, and fewer are not
-/// worth other bits.
+/// Returns the first and second derivatives of a scalar by the cheapest route. Routes that are tried in a graph of
+/// their own must be shorter by a twentieth: what is not taken must not influence which products are fused, and fewer
+/// are not worth other bits.
 pub fn second_order(
     g: &mut Graph,
     routine: &'static str,
@@ -137,17 +137,11 @@ pub fn second_order(
     let forms = collapsed
         .iter()
         .flat_map(|&collapsed| rationals.iter().map(move |&spelled_out| DerivativeForms { spelled_out, collapsed }));
-    for forms in forms {
+    for (forms, kind) in forms.flat_map(|forms| [(forms, Attempt::Factored), (forms, Attempt::AtWideCuts)]) {
         let mut other = before.clone();
         let attempt = || {
             other.differentiate_by(forms);
-            let mut alternatives = factored_derivatives(&mut other, value, coordinates);
-            if forms != first {
-                alternatives.extend(second_derivatives(&mut other, value, coordinates));
-            }
-            if forms.collapsed {
-                by_vectors_where_lengths_vanish(&mut other, value, coordinates, &mut alternatives);
-            }
+            let alternatives = kind.routes(&mut other, value, coordinates, forms != first);
             cheapest(&mut other, routine, &[value], &alternatives)
         };
         let Some((Some((others, found)), [steps, bytes])) = before.budget().attempt(STEPS, attempt) else { continue };
@@ -163,6 +157,45 @@ pub fn second_order(
     }
     let hessian = nodes.split_off(coordinates.len());
     (SecondOrder { value, gradient: nodes, hessian }, routes)
+}
+
+/// Routes that are tried in a graph of their own.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Attempt {
+    /// Common factors are taken out of sums of products.
+    Factored,
+    /// Derivatives are gathered at cuts that may be as wide as the coordinates.
+    AtWideCuts,
+}
+
+impl Attempt {
+    /// Returns its routes, at least one of which is safe, or none. Where derivatives have other forms than those of the
+    /// first routes, these are tried again.
+    fn routes(
+        self,
+        g: &mut Graph,
+        value: NodeId,
+        coordinates: &Coordinates,
+        has_other_forms: bool,
+    ) -> Vec<Alternative> {
+        let mut list = match self {
+            Self::Factored => factored_derivatives(g, value, coordinates),
+            Self::AtWideCuts => at_wide_cuts(g, value, coordinates),
+        };
+        if self == Self::Factored && has_other_forms {
+            list.extend(second_derivatives(g, value, coordinates));
+        }
+        if list.is_empty() {
+            return list;
+        }
+        if g.derivative_forms().collapsed {
+            by_vectors_where_lengths_vanish(g, value, coordinates, &mut list);
+        }
+        if !list.iter().any(|route| route.safe) {
+            list.push(safe_everywhere(g, value, coordinates));
+        }
+        list
+    }
 }
 
 /// Takes derivatives by vectors where the length of one vanishes.
@@ -223,7 +256,7 @@ fn second_derivatives(g: &mut Graph, value: NodeId, coordinates: &Coordinates) -
     let n = coordinates.len();
     let whole = adjoint::alone(g, value);
     let safe = [Order::First, Order::Second].into_iter().all(|order| adjoint::is_safe(g, &[value], order, true));
-    let gradients = gradients(g, value, coordinates);
+    let gradients = gradients(g, value, coordinates, Width::Narrower);
     let entries = forward::second_derivatives(g, value, coordinates);
     let mut alternatives = Vec::new();
     let mut offer = |g: &mut Graph, name, gradient: &[NodeId], entries: &BTreeMap<usize, NodeId>, safe| {
@@ -241,7 +274,7 @@ fn second_derivatives(g: &mut Graph, value: NodeId, coordinates: &Coordinates) -
             offer(g, "adjoint-weighted, reverse gradient", gradient, &entries, safe);
         }
     }
-    let (cuts, mut by_cut) = (cuts(g, value, coordinates), ByCut::new(g, None));
+    let (cuts, mut by_cut) = (cuts(g, value, coordinates), ByCut::new(g, None, Width::Narrower));
     let plain = || AsTheyCome::new(n);
     alternatives.extend(gathered(g, value, coordinates, gradients.apart.as_ref(), (&cuts, &mut by_cut), plain));
     alternatives
@@ -251,29 +284,57 @@ fn second_derivatives(g: &mut Graph, value: NodeId, coordinates: &Coordinates) -
 /// the linear part.
 fn factored_derivatives(g: &mut Graph, value: NodeId, coordinates: &Coordinates) -> Vec<Alternative> {
     let (n, of_formula) = (coordinates.len(), g.last());
-    let apart = is_computed_otherwise(g, value).then(|| gradients(g, value, coordinates).apart).flatten();
+    let apart = apart(g, value, coordinates, Width::Narrower);
     let narrowest = LinearPart::new(g, value, coordinates, Order::Second).narrowest();
     let narrowest: Vec<Cut> = narrowest.map(|cut| ("gathered at a waist", cut)).into_iter().collect();
     let all = [cuts(g, value, coordinates), narrowest.clone()].concat();
-    let mut by_cut = ByCut::new(g, Some(of_formula));
+    let mut by_cut = ByCut::new(g, Some(of_formula), Width::Narrower);
     let factored = || Factored::new(n, of_formula);
     let list = gathered(g, value, coordinates, apart.as_ref(), (&all, &mut by_cut), factored);
     let mut alternatives: Vec<_> = list.into_iter().map(|route| Alternative { factored: true, ..route }).collect();
     let plain = || AsTheyCome::new(n);
     alternatives.extend(gathered(g, value, coordinates, apart.as_ref(), (&narrowest, &mut by_cut), plain));
-    if !alternatives.is_empty() && !alternatives.iter().any(|route| route.safe) {
-        alternatives.push(safe_everywhere(g, value, coordinates));
-    }
     alternatives
+}
+
+/// Returns the routes through further cuts, which may be as wide as the coordinates: waists, and primitives with what
+/// leads around them. Factors are taken out at narrow ones.
+fn at_wide_cuts(g: &mut Graph, value: NodeId, coordinates: &Coordinates) -> Vec<Alternative> {
+    let (n, of_formula) = (coordinates.len(), g.last());
+    let primitives = Primitives::new(g, value, coordinates).and_then(|primitives| primitives.with_others(coordinates));
+    let waists = cut::waists(g, value, coordinates, Order::Second, Width::AsWide);
+    let mut cuts: Vec<Cut> = waists.into_iter().map(|cut| ("gathered at a waist", cut)).collect();
+    cuts.extend(primitives.map(|cut| ("gathered at primitives", cut)));
+    let known = self::cuts(g, value, coordinates);
+    cuts.retain(|(_, cut)| known.iter().all(|(_, other)| other != cut));
+    if cuts.is_empty() {
+        return Vec::new();
+    }
+    let apart = apart(g, value, coordinates, Width::AsWide);
+    let mut by_cut = ByCut::new(g, None, Width::AsWide);
+    let plain = || AsTheyCome::new(n);
+    let mut alternatives = gathered(g, value, coordinates, apart.as_ref(), (&cuts, &mut by_cut), plain);
+    cuts.retain(|(_, cut)| cut.len() <= cut::NARROW);
+    let mut by_cut = ByCut::new(g, Some(of_formula), Width::AsWide);
+    let factored = || Factored::new(n, of_formula);
+    let list = gathered(g, value, coordinates, apart.as_ref(), (&cuts, &mut by_cut), factored);
+    alternatives.extend(list.into_iter().map(|route| Alternative { factored: true, ..route }));
+    alternatives
+}
+
+/// Returns the gradient of what first derivatives pass through, if second ones pass through other nodes.
+fn apart(g: &mut Graph, value: NodeId, coordinates: &Coordinates, width: Width) -> Option<(Vec<NodeId>, bool)> {
+    is_computed_otherwise(g, value).then(|| gradients(g, value, coordinates, width).apart).flatten()
 }
 
 /// A cut, and the name of the route through it.
 type Cut = (&'static str, Vec<NodeId>);
 
 fn cuts(g: &Graph, value: NodeId, coordinates: &Coordinates) -> Vec<Cut> {
-    let primitives = cut::primitives(g, value, coordinates).map(|cut| ("gathered at primitives", cut));
-    let waists = cut::waists(g, value, coordinates, Order::Second).into_iter();
-    primitives.into_iter().chain(waists.map(|cut| ("gathered at a waist", cut))).collect()
+    let primitives = Primitives::new(g, value, coordinates).and_then(|primitives| primitives.alone(coordinates));
+    let waists = cut::waists(g, value, coordinates, Order::Second, Width::Narrower).into_iter();
+    let primitives = primitives.into_iter().map(|cut| ("gathered at primitives", cut));
+    primitives.chain(waists.map(|cut| ("gathered at a waist", cut))).collect()
 }
 
 /// Returns the routes on which derivatives are gathered at cuts, with this gradient if it is that of other nodes.
@@ -312,7 +373,7 @@ struct Gradients {
     apart: Option<(Vec<NodeId>, bool)>,
 }
 
-fn gradients(g: &mut Graph, value: NodeId, coordinates: &Coordinates) -> Gradients {
+fn gradients(g: &mut Graph, value: NodeId, coordinates: &Coordinates, width: Width) -> Gradients {
     let is_apart = is_computed_otherwise(g, value);
     let order = if is_apart { Order::First } else { Order::Second };
     let forward = forward::first_derivatives(g, &[value], coordinates, Order::First).remove(0);
@@ -321,15 +382,15 @@ fn gradients(g: &mut Graph, value: NodeId, coordinates: &Coordinates) -> Gradien
     let apart = is_apart.then(|| {
         let mut list = vec![(forward.clone(), true)];
         list.extend(reverse.clone().map(|gradient| (gradient, adjoint::is_safe(g, &[value], order, true))));
-        list.extend(at_waists(g, value, coordinates));
+        list.extend(at_waists(g, value, coordinates, width));
         list.into_iter().min_by_key(|(gradient, _)| cut::cost(g, gradient)).expect("a route exists")
     });
     Gradients { forward, reverse, apart }
 }
 
 /// Returns the gradients that are gathered at waists, and whether each is right everywhere.
-fn at_waists(g: &mut Graph, value: NodeId, coordinates: &Coordinates) -> Vec<(Vec<NodeId>, bool)> {
-    let waists = cut::waists(g, value, coordinates, Order::First);
+fn at_waists(g: &mut Graph, value: NodeId, coordinates: &Coordinates, width: Width) -> Vec<(Vec<NodeId>, bool)> {
+    let waists = cut::waists(g, value, coordinates, Order::First, width);
     waists.into_iter().filter_map(|cut| cut::gradient(g, value, &cut, coordinates)).collect()
 }
 
