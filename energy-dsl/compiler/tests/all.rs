@@ -1,6 +1,7 @@
 //! The tests of the public interface, one module a subject. One program links once and shares all cores.
 #![allow(missing_docs)]
 
+mod differences;
 mod golden;
 mod growth;
 mod language;

@@ -75,13 +75,14 @@ const FORMULAS: [(&str, usize); 21] = [
       }",
         60,
     ),
-    // Distances from the centre: three of the four are independent.
+    // Distances from the centre: three of the four are independent. Seen from one point, so that they keep their digits
+    // far from the origin.
     (
         "energy Centred(a, b, c, d: Point; k: Scalar) {
         let m = (a + b + c + d) / 4;
         k * (norm_squared(a - m) + norm_squared(b - m) + norm(c - m) + norm(d - m)^4)
       }",
-        140,
+        145,
     ),
     // Second derivatives of the printed formula, value and gradient of one that does not cancel.
     (

@@ -121,6 +121,25 @@ impl Coordinates {
         let functions = Front::of_linear_functions(g, outputs, unknowns, moving);
         let fewer = functions.filter(|functions| functions.span.basis.len() < differences.span.basis.len());
         let front = fewer.unwrap_or(differences);
+        Self::of_front(g, &front, outputs, unknowns, moving)
+    }
+
+    /// Finds the linear functions of unknowns that `outputs` depend on. `None` unless there are as many as differences, but
+    /// other ones.
+    pub fn of_as_many_functions(
+        g: &mut Graph,
+        outputs: &[NodeId],
+        unknowns: &Unknowns,
+        moving: Moving,
+    ) -> Option<Self> {
+        let differences = Front::of_differences(g, outputs, unknowns, moving);
+        let functions = Front::of_linear_functions(g, outputs, unknowns, moving)?;
+        let are_others = functions.nodes.keys().ne(differences.nodes.keys());
+        let is_as_short = functions.span.basis.len() == differences.span.basis.len();
+        (are_others && is_as_short).then(|| Self::of_front(g, &functions, outputs, unknowns, moving))
+    }
+
+    fn of_front(g: &mut Graph, front: &Front, outputs: &[NodeId], unknowns: &Unknowns, moving: Moving) -> Self {
         let basis = &front.span.basis;
         let mut starts = vec![0];
         for sum in basis {

@@ -118,6 +118,16 @@ fn by_parts(g: &mut Graph, args: &[Lowered], op: fn(&mut Graph, NodeId, NodeId) 
     Lowered { shape: args[0].shape, parts }
 }
 
+/// Returns a + b or a − b. What is a sum of differences of unknowns is computed from these.
+fn summed(g: &mut Graph, a: NodeId, b: NodeId, sign: f64) -> NodeId {
+    if g.form() == Form::Robust
+        && let Some(sum) = g.by_differences(a, b, sign)
+    {
+        return sum;
+    }
+    if sign > 0.0 { g.add(a, b) } else { g.sub(a, b) }
+}
+
 /// Returns the robust form of an operation on scalars that the user wrote.
 fn recognised(g: &mut Graph, ending: Ending, args: &[Lowered]) -> Option<Lowered> {
     let [Lowered { shape: Shape::Scalar, parts: a }, Lowered { shape: Shape::Scalar, parts: b }] = args else {
@@ -127,7 +137,7 @@ fn recognised(g: &mut Graph, ending: Ending, args: &[Lowered]) -> Option<Lowered
 }
 
 fn add(g: &mut Graph, args: &[Lowered]) -> Lowered {
-    recognised(g, Ending::WrittenSum, args).unwrap_or_else(|| by_parts(g, args, Graph::add))
+    recognised(g, Ending::WrittenSum, args).unwrap_or_else(|| by_parts(g, args, |g, a, b| summed(g, a, b, 1.0)))
 }
 
 fn sub(g: &mut Graph, args: &[Lowered]) -> Lowered {
@@ -140,7 +150,7 @@ fn sub(g: &mut Graph, args: &[Lowered]) -> Lowered {
     if let Some(recognised) = recognised(g, Ending::WrittenDifference, args) {
         return recognised;
     }
-    let difference = by_parts(g, args, Graph::sub);
+    let difference = by_parts(g, args, |g, a, b| summed(g, a, b, -1.0));
     if matches!(g.origin(&args[1].parts), Some(Origin::Rotation { matrix, .. }) if *matrix == args[0].parts) {
         g.note_origin(&difference.parts, Origin::Unrotated { matrix: args[0].parts.clone() });
     }

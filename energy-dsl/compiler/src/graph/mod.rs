@@ -5,6 +5,7 @@ mod build;
 mod contraction;
 mod count;
 mod derivative_forms;
+mod differences;
 mod fuse;
 mod interpret;
 mod mask;

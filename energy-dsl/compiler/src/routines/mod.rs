@@ -270,7 +270,7 @@ pub fn differentiate(
     let refused = refused(&mut rest);
     let g = &mut graph;
     let (unknowns, is_mixed) = (Unknowns::of(&program.moving), program.is_mixed());
-    let coordinates = match program.kind {
+    let mut coordinates = match program.kind {
         Kind::Residual => Coordinates::of_unknowns(g, &unknowns),
         _ => Coordinates::reduced(g, &outputs, &unknowns, Moving::Unknowns),
     };
@@ -278,7 +278,11 @@ pub fn differentiate(
     let (mut expansion, mut dihedral) = (None, None);
     let list: Vec<Whole> = match program.kind {
         Kind::Energy => {
-            let (energy, taken) = second_order(g, RoutineKind::Hessian.name(), outputs[0], &coordinates);
+            let before = g.clone();
+            let (mut energy, mut taken) = second_order(g, RoutineKind::Hessian.name(), outputs[0], &coordinates);
+            if let Some(other) = by_linear_functions(before, outputs[0], &unknowns, taken.list[0].cost) {
+                (*g, coordinates, energy, taken) = other;
+            }
             routes.push(taken);
             (expansion, dihedral) = of_points(g, &energy, &coordinates, is_mixed);
             potential(g, &energy, &coordinates, is_mixed, &mut routes)
@@ -316,6 +320,27 @@ pub fn differentiate(
         graph,
         repetition,
     }
+}
+
+/// Steps of the compiler for derivatives by other coordinates.
+const STEPS: u64 = 2_000_000;
+
+/// Differentiates by linear functions of the unknowns, if these are as many as their differences. `None` if that is not
+/// cheaper by a twentieth.
+fn by_linear_functions(
+    mut graph: Graph,
+    output: NodeId,
+    unknowns: &Unknowns,
+    cost: usize,
+) -> Option<(Graph, Coordinates, SecondOrder, Routes)> {
+    let coordinates = Coordinates::of_as_many_functions(&mut graph, &[output], unknowns, Moving::Unknowns)?;
+    let budget = graph.budget().clone();
+    let attempt = || second_order(&mut graph, RoutineKind::Hessian.name(), output, &coordinates);
+    let ((energy, taken), [steps, bytes]) = budget.attempt(STEPS, attempt)?;
+    (20 * taken.list[0].cost < 19 * cost).then(|| {
+        budget.spend(steps, bytes);
+        (graph, coordinates, energy, taken)
+    })
 }
 
 /// Returns what only energies of points have: the expansion from reduced coordinates, and the points of a dihedral angle.
