@@ -53,3 +53,16 @@ fn sums_are_what_they_were() {
     let [value, ..] = evaluate(FORMULAS[6], &x);
     assert!((value[0] - expected).abs() <= 1e-15 * expected, "{} and {expected}", value[0]);
 }
+
+#[test]
+fn weights_that_nearly_cancel_are_kept() {
+    // 1 − 3 · 0.333333333333333 = 1e-15, of points 1e6 from the origin.
+    let x: Vec<f64> = (0..12).map(|i| 1e6 + f64::from(i)).collect();
+    let [value, ..] = evaluate("k * norm_squared(1e9 * (p - 0.333333333333333 * (a + b + c)))", &x);
+    let [exact, ..] = evaluate("k * norm_squared(1e9 * (p - (a + b + c) / 3))", &x);
+    assert!(value != exact);
+    let [value, ..] = evaluate("k * norm_squared(p - 0.3333333 * (a + b + c))", &x);
+    let part = |i: usize| x[i] - 0.333_333_3 * (x[3 + i] + x[6 + i] + x[9 + i]);
+    let expected = 1.3 * (0..3).map(|i| part(i).powi(2)).sum::<f64>();
+    assert!((value[0] - expected).abs() <= 1e-8 * expected, "{} and {expected}", value[0]);
+}

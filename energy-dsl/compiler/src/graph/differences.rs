@@ -14,8 +14,8 @@ struct LinearSum {
     others: BTreeMap<NodeId, f64>,
 }
 
-/// Weights below this part of the largest one are rounding errors.
-const NEGLIGIBLE: f64 = 1e-14;
+/// Weights below this part of the others are rounding errors.
+const NEGLIGIBLE: f64 = 2.0 * f64::EPSILON;
 /// The most nodes of a sum.
 const MOST: usize = 128;
 
