@@ -33,8 +33,6 @@ pub(super) struct ByCut {
     known: BTreeMap<Vec<NodeId>, Gathered>,
     /// The last node of the formula, if common factors are taken out.
     factored: Option<NodeId>,
-    /// The width of cuts above a cut.
-    width: Width,
     /// Steps of the compiler after which no more cuts are looked for.
     last_step: u64,
 }
@@ -43,8 +41,8 @@ pub(super) struct ByCut {
 const STEPS: u64 = 2_000_000;
 
 impl ByCut {
-    pub(super) fn new(g: &Graph, factored: Option<NodeId>, width: Width) -> Self {
-        Self { known: BTreeMap::new(), factored, width, last_step: g.budget().progress().steps.saturating_add(STEPS) }
+    pub(super) fn new(g: &Graph, factored: Option<NodeId>) -> Self {
+        Self { known: BTreeMap::new(), factored, last_step: g.budget().progress().steps.saturating_add(STEPS) }
     }
 
     /// Returns whether there are steps left.
@@ -145,7 +143,8 @@ fn by_cut(g: &mut Graph, output: NodeId, cut: &[NodeId], known: &mut ByCut) -> G
         }
     };
     let is_nested = cut.len() >= NARROW || known.factored.is_some();
-    let mut waists = if is_nested { waists(g, output, &coordinates, Order::Second, known.width) } else { Vec::new() };
+    let mut waists =
+        if is_nested { waists(g, output, &coordinates, Order::Second, Width::Narrower) } else { Vec::new() };
     if known.factored.is_some() && cut.len() >= NARROW {
         waists.extend(LinearPart::new(g, output, &coordinates, Order::Second).narrowest());
     }

@@ -274,7 +274,7 @@ fn second_derivatives(g: &mut Graph, value: NodeId, coordinates: &Coordinates) -
             offer(g, "adjoint-weighted, reverse gradient", gradient, &entries, safe);
         }
     }
-    let (cuts, mut by_cut) = (cuts(g, value, coordinates), ByCut::new(g, None, Width::Narrower));
+    let (cuts, mut by_cut) = (cuts(g, value, coordinates), ByCut::new(g, None));
     let plain = || AsTheyCome::new(n);
     alternatives.extend(gathered(g, value, coordinates, gradients.apart.as_ref(), (&cuts, &mut by_cut), plain));
     alternatives
@@ -288,7 +288,7 @@ fn factored_derivatives(g: &mut Graph, value: NodeId, coordinates: &Coordinates)
     let narrowest = LinearPart::new(g, value, coordinates, Order::Second).narrowest();
     let narrowest: Vec<Cut> = narrowest.map(|cut| ("gathered at a waist", cut)).into_iter().collect();
     let all = [cuts(g, value, coordinates), narrowest.clone()].concat();
-    let mut by_cut = ByCut::new(g, Some(of_formula), Width::Narrower);
+    let mut by_cut = ByCut::new(g, Some(of_formula));
     let factored = || Factored::new(n, of_formula);
     let list = gathered(g, value, coordinates, apart.as_ref(), (&all, &mut by_cut), factored);
     let mut alternatives: Vec<_> = list.into_iter().map(|route| Alternative { factored: true, ..route }).collect();
@@ -311,11 +311,11 @@ fn at_wide_cuts(g: &mut Graph, value: NodeId, coordinates: &Coordinates) -> Vec<
         return Vec::new();
     }
     let apart = apart(g, value, coordinates, Width::AsWide);
-    let mut by_cut = ByCut::new(g, None, Width::AsWide);
+    let mut by_cut = ByCut::new(g, None);
     let plain = || AsTheyCome::new(n);
     let mut alternatives = gathered(g, value, coordinates, apart.as_ref(), (&cuts, &mut by_cut), plain);
     cuts.retain(|(_, cut)| cut.len() <= cut::NARROW);
-    let mut by_cut = ByCut::new(g, Some(of_formula), Width::AsWide);
+    let mut by_cut = ByCut::new(g, Some(of_formula));
     let factored = || Factored::new(n, of_formula);
     let list = gathered(g, value, coordinates, apart.as_ref(), (&cuts, &mut by_cut), factored);
     alternatives.extend(list.into_iter().map(|route| Alternative { factored: true, ..route }));
