@@ -26,7 +26,7 @@ pub use coordinates::Coordinates;
 pub use dihedral::only_dihedral;
 pub use forward::{first_derivatives, second_derivatives};
 pub use local::Order;
-pub use routes::{Route, Routes, SecondOrder, first_order, hessian_vector, second_order};
+pub use routes::{ATTEMPT, Route, Routes, SecondOrder, first_order, hessian_vector, is_worth_taking, second_order};
 pub use unknowns::{Moving, Unknown, Unknowns, by_increments};
 
 use std::collections::{BTreeMap, BTreeSet};

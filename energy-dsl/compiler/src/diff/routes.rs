@@ -113,11 +113,15 @@ fn choose(
 }
 
 /// Steps of the compiler for the routes of a routine that may be given up.
-const STEPS: u64 = 2_000_000;
+pub const ATTEMPT: u64 = 2_000_000;
 
-/// Returns the first and second derivatives of a scalar by the cheapest route. Routes that are tried in a graph of
-/// their own must be shorter by a twentieth: what is not taken must not influence which products are fused, and fewer
-/// are not worth other bits.
+/// Returns whether a route that is tried in a graph of its own is shorter by a twentieth. What is not taken must not
+/// influence which products are fused, and fewer operations are not worth other bits.
+pub fn is_worth_taking(cost: usize, instead_of: usize) -> bool {
+    20 * cost < 19 * instead_of
+}
+
+/// Returns the first and second derivatives of a scalar by the cheapest route.
 pub fn second_order(
     g: &mut Graph,
     routine: &'static str,
@@ -144,8 +148,8 @@ pub fn second_order(
             let alternatives = kind.routes(&mut other, value, coordinates, forms != first);
             cheapest(&mut other, routine, &[value], &alternatives)
         };
-        let Some((Some((others, found)), [steps, bytes])) = before.budget().attempt(STEPS, attempt) else { continue };
-        let is_taken = 20 * found.list[0].cost < 19 * routes.list[0].cost;
+        let Some((Some((others, found)), [steps, bytes])) = before.budget().attempt(ATTEMPT, attempt) else { continue };
+        let is_taken = is_worth_taking(found.list[0].cost, routes.list[0].cost);
         let taken = if is_taken { found.list[0] } else { routes.list[0] };
         if is_taken {
             other.differentiate_by(DerivativeForms::default());

@@ -115,39 +115,22 @@ impl Graph {
         sum.unknowns.keys().copied().max_by_key(rank).expect("compiler bug: a sum without unknowns")
     }
 
-    /// Returns a linear function with all unknowns replaced by their differences to one of them.
+    /// Returns a linear function with all unknowns replaced by their differences to one of them. Parts of it whose weights
+    /// cancel stay.
     fn seen_from(&mut self, node: NodeId, origin: u16) -> NodeId {
-        let sum = self.linear_sum(node, &mut MOST.clone());
-        if sum.is_none_or(|sum| sum.cancels()) {
+        if self.linear_sum(node, &mut { MOST }).is_none_or(|sum| sum.cancels()) {
             return node;
         }
         match self.op(node) {
             Op::Input(Input::Position(unknown)) if unknown == origin => self.constant(0.0),
-            Op::Input(Input::Position(_)) => {
+            Op::Input(_) => {
                 let origin = self.input(Input::Position(origin));
                 self.sub(node, origin)
             }
-            Op::Neg(a) => {
-                let a = self.seen_from(a, origin);
-                self.neg(a)
+            op => {
+                let seen: BTreeMap<NodeId, NodeId> = op.operands().map(|o| (o, self.seen_from(o, origin))).collect();
+                self.rebuilt(op.with_operands(|operand| seen[&operand]))
             }
-            Op::Add(a, b) => {
-                let (a, b) = (self.seen_from(a, origin), self.seen_from(b, origin));
-                self.add(a, b)
-            }
-            Op::Sub(a, b) => {
-                let (a, b) = (self.seen_from(a, origin), self.seen_from(b, origin));
-                self.sub(a, b)
-            }
-            Op::Mul(a, b) => {
-                let (a, b) = (self.seen_from(a, origin), self.seen_from(b, origin));
-                self.mul(a, b)
-            }
-            Op::Div(a, b) => {
-                let a = self.seen_from(a, origin);
-                self.div(a, b)
-            }
-            _ => node,
         }
     }
 

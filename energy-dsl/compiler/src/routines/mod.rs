@@ -13,7 +13,8 @@ use rustc_hash::FxHashMap;
 use crate::budget::{Budget, Phase};
 use crate::check::Program;
 use crate::diff::{
-    Coordinates, Moving, Routes, SecondOrder, Unknowns, first_order, hessian_vector, only_dihedral, second_order,
+    ATTEMPT, Coordinates, Moving, Routes, SecondOrder, Unknowns, first_order, hessian_vector, is_worth_taking,
+    only_dihedral, second_order,
 };
 use crate::graph::{Graph, Input, NodeId, Op, general, ordinary, with_signs_inside};
 use crate::lower::{Formula, LoweredProgram, Repetition, RestFormula};
@@ -322,9 +323,6 @@ pub fn differentiate(
     }
 }
 
-/// Steps of the compiler for derivatives by other coordinates.
-const STEPS: u64 = 2_000_000;
-
 /// Differentiates by linear functions of the unknowns, if these are as many as their differences. `None` if that is not
 /// cheaper by a twentieth.
 fn by_linear_functions(
@@ -336,8 +334,8 @@ fn by_linear_functions(
     let coordinates = Coordinates::of_as_many_functions(&mut graph, &[output], unknowns, Moving::Unknowns)?;
     let budget = graph.budget().clone();
     let attempt = || second_order(&mut graph, RoutineKind::Hessian.name(), output, &coordinates);
-    let ((energy, taken), [steps, bytes]) = budget.attempt(STEPS, attempt)?;
-    (20 * taken.list[0].cost < 19 * cost).then(|| {
+    let ((energy, taken), [steps, bytes]) = budget.attempt(ATTEMPT, attempt)?;
+    is_worth_taking(taken.list[0].cost, cost).then(|| {
         budget.spend(steps, bytes);
         (graph, coordinates, energy, taken)
     })
